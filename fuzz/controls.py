@@ -164,7 +164,7 @@ DEFECTS = [
     ("drives", "a VESC rests at a duty of zero", "src/vesc/config.rs",
      "Self::Release => Command::RELEASE,", "Self::Release => Command::Duty(0.0),"),
     ("drives", "an ODrive in velocity mode rests at a velocity of zero", "src/odrive/bus.rs",
-     "            _ => self.idle(),\n        }\n    }\n\n    fn control", "            VELOCITY => self.send(Command::Velocity(0.0, 0.0)),\n            _ => self.idle(),\n        }\n    }\n\n    fn control"),
+     "Command::Torque(0.0) } else { Command::IDLE };", "Command::Torque(0.0) } else { Command::Velocity(0.0, 0.0) };"),
     ("drives", "a RobStride is enabled without its torque limit", "src/robstride/config.rs",
      "limit(Register::TorqueLimit, nm)", "limit(Register::TorqueLimit, 17.0 + 0.0 * nm)"),
     ("drives", "a RobStride in current mode has no limit", "src/robstride/config.rs",

@@ -237,11 +237,7 @@ impl OwnMotor for Motor {
         if frame.length() != 8 || !is_answer(data, self.id) {
             return false;
         }
-        if let Some(asked) = self.settings.asked()
-            && let Some(value) = value(data, self.id, asked)
-        {
-            self.settings.take(asked, value);
-        }
+        self.settings.hear(|asked| value(data, self.id, asked));
         true
     }
 

@@ -8,7 +8,7 @@ use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::{
     Capabilities, Capability, Claim, Goal, Ingest, Malformed, MotorName, Order, OwnMotor,
-    Questions, Role, Severity, Vitals, WrongSetting,
+    Questions, Role, Vitals, WrongSetting,
 };
 use crate::units::{Angle, AngularVelocity};
 
@@ -316,12 +316,8 @@ impl OwnMotor for Motor {
     }
 
     fn wrong_setting(&self) -> Option<WrongSetting> {
-        self.state.is_none().then(|| WrongSetting {
-            motor: self.name(),
-            setting: "motorState",
-            expected: f32::from(OFF),
-            found: None,
-        })
+        let is_unknown = self.state.is_none();
+        is_unknown.then(|| WrongSetting::new(self.name(), "motorState", OFF.into(), None))
     }
 
     fn forget_settings(&mut self) {
@@ -338,11 +334,10 @@ impl OwnMotor for Motor {
         let errors = self.state.map_or(0, |state| state.errors);
         Vitals {
             temperature_c: Some(drive.temperature_c.into()),
-            error: (errors != 0).then_some(Severity::Fault),
-            error_code: errors,
             effort: self.mode.0.effort(),
             speed: self.model.speed_share(self.velocity().as_rad_per_s()),
             current: self.turned(f32::from(drive.current) / MOST_COUNTS),
+            ..Vitals::of_errors([errors], 0)
         }
     }
 }

@@ -28,6 +28,17 @@ pub struct WrongSetting {
     pub found: Option<f32>,
 }
 
+impl WrongSetting {
+    pub(crate) const fn new(
+        motor: MotorName,
+        setting: &'static str,
+        expected: f32,
+        found: Option<f32>,
+    ) -> Self {
+        Self { motor, setting, expected, found }
+    }
+}
+
 impl core::fmt::Display for WrongSetting {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         let Self { motor, setting, expected, found } = self;

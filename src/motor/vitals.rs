@@ -38,3 +38,13 @@ pub struct Vitals {
     /// The current as a share; 0 if not known.
     pub current: f32,
 }
+
+impl Vitals {
+    /// Returns vitals with the first of several codes of faults, or the code of a warning; 0 for none.
+    pub(crate) fn of_errors<const N: usize>(faults: [u8; N], warning: u8) -> Self {
+        let fault = faults.into_iter().find(|code| *code > 0).map(|code| (Severity::Fault, code));
+        let warning = (warning > 0).then_some((Severity::Warning, warning));
+        let (error, code) = fault.or(warning).unzip();
+        Self { error, error_code: code.unwrap_or(0), ..Self::default() }
+    }
+}

@@ -1,6 +1,5 @@
 //! The codec of commands to a drive.
 
-use super::Firmware;
 use super::config::Endpoint;
 use crate::frame::{CanFrame, standard_id};
 use crate::motor::Form;
@@ -67,6 +66,8 @@ pub enum Command {
 }
 
 impl Command {
+    pub(super) const IDLE: Self = Self::AxisState(super::Heartbeat::IDLE as u32);
+
     /// Writes the frame for a node, 0 to 63; the upper bits of a larger number are left out.
     #[must_use]
     pub fn frame(self, node: u8) -> CanFrame {
@@ -126,15 +127,12 @@ pub(super) fn id(node: u8, number: u8) -> Id {
     standard_id(u16::from(node & 0x3F) << 5 | u16::from(number & 0x1F))
 }
 
+/// Returns the number of a message.
+pub(super) fn number_of(frame: &CanFrame) -> u8 {
+    (frame.header() & 0x1F) as u8
+}
+
 /// Numbers of the commands, claimed in each mode of the motor: firmware 0.5 takes a torque from each target, also in torque mode, and
 /// feeds its watchdog by each frame. The last is a command of motors with endpoints only.
 pub(super) const COMMANDS: [u8; 11] =
     [0x02, 0x07, 0x0B, 0x0C, 0x0D, 0x0E, 0x0F, 0x11, 0x12, 0x18, ASK_ENDPOINT];
-
-/// Returns the numbers of the messages from a firmware to the motor: estimates and heartbeat, for 0.6 also errors and endpoints.
-pub(super) const fn heard(firmware: Firmware) -> &'static [u8] {
-    match firmware {
-        Firmware::V0_5 => &[ESTIMATES, HEARTBEAT],
-        Firmware::V0_6 => &[ESTIMATES, HEARTBEAT, ERRORS, ENDPOINT],
-    }
-}

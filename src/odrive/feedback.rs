@@ -1,6 +1,8 @@
 //! The codec of frames from a drive.
 
-use crate::motor::lowest_bit;
+use super::command::{ENDPOINT, ERRORS, ESTIMATES, HEARTBEAT};
+use super::config::Endpoint;
+use crate::motor::{Inquiry, lowest_bit};
 
 /// The generation of the firmware, which decides the layout of a heartbeat.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -11,6 +13,17 @@ pub enum Firmware {
     V0_5,
     /// 0.6: ODrive Pro, S1 and Micro.
     V0_6,
+}
+
+impl Firmware {
+    /// Returns the numbers of the messages to the motor: estimates and heartbeat, for 0.6 also errors and endpoints; and the axis error
+    /// of a stop that was requested over CAN.
+    pub(super) const fn facts(self) -> (&'static [u8], u32) {
+        match self {
+            Self::V0_5 => (&[ESTIMATES, HEARTBEAT], 0x4000),
+            Self::V0_6 => (&[ESTIMATES, HEARTBEAT, ERRORS, ENDPOINT], 0x0200_0000),
+        }
+    }
 }
 
 /// The encoder estimates of a drive: turns of the motor's shaft since power-on, and turns/s.
@@ -41,11 +54,8 @@ impl Feedback {
     pub const fn decode(data: &[u8; 8]) -> Option<Self> {
         let (turns, turns_per_s) = words(data);
         let (turns, turns_per_s) = (f32::from_bits(turns), f32::from_bits(turns_per_s));
-        if turns.is_finite() && turns_per_s.is_finite() {
-            Some(Self { turns, turns_per_s })
-        } else {
-            None
-        }
+        let is_finite = turns.is_finite() && turns_per_s.is_finite();
+        if is_finite { Some(Self { turns, turns_per_s }) } else { None }
     }
 }
 
@@ -107,21 +117,11 @@ impl Heartbeat {
     #[must_use]
     pub const fn error_code(&self) -> u8 {
         match (self.axis_error, self.has_errors) {
-            (0, [false, false, false]) => 0,
             (0, [true, ..]) => 33,
             (0, [_, true, _]) => 34,
-            (0, _) => 35,
+            (0, [.., true]) => 35,
             (error, _) => lowest_bit(error),
         }
-    }
-
-    /// Tells whether a stop was requested over CAN.
-    pub(super) const fn is_stopped(&self, firmware: Firmware) -> bool {
-        let bit = match firmware {
-            Firmware::V0_5 => 0x4000,
-            Firmware::V0_6 => 0x0200_0000,
-        };
-        self.axis_error & bit != 0
     }
 }
 
@@ -131,13 +131,14 @@ pub(super) const fn words(data: &[u8; 8]) -> (u32, u32) {
     (u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h]))
 }
 
-/// Reads the value of an endpoint from an answer of 5 to 8 bytes; `None` for another endpoint.
+/// Reads the value of an endpoint from the answer to a question, of 5 to 8 bytes; `None` for another endpoint.
 ///
 /// ```text
 /// byte 0   1 .. 2     3   4 ..
 /// 0        endpoint   0   value, low byte first
 /// ```
-pub(super) fn endpoint_value(data: &[u8; 8], length: usize, number: u16) -> Option<[u8; 4]> {
+pub(super) fn endpoint_value(data: &[u8; 8], length: u8, asked: Inquiry<Endpoint>) -> Option<f32> {
     let [_, low, high, _, value @ ..] = *data;
-    (length > 4 && u16::from_le_bytes([low, high]) == number).then_some(value)
+    let Inquiry::Read((number, form)) = asked else { return None };
+    (length > 4 && u16::from_le_bytes([low, high]) == number).then(|| form.value_of(value))
 }

@@ -82,12 +82,10 @@ mod config;
 mod enabling;
 mod feedback;
 mod model;
-mod motor;
 #[cfg(test)]
 mod tests;
 
 pub use command::Command;
-pub use config::{Endpoints, Mode};
+pub use config::{Endpoints, Mode, Motor};
 pub use feedback::{Feedback, Firmware, Heartbeat};
 pub use model::Model;
-pub use motor::Motor;

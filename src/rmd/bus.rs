@@ -10,7 +10,7 @@ use crate::lk::command::{id_of, is_command};
 use crate::lk::model::RAD_PER_DEGREE;
 use crate::motor::{
     Capabilities, Capability, Claim, Goal, Ingest, Malformed, MotorName, Order, OwnMotor,
-    Questions, Role, Severity, Vitals, WrongSetting, lowest_bit,
+    Questions, Role, Vitals, WrongSetting, lowest_bit,
 };
 use crate::units::{Angle, AngularVelocity};
 
@@ -248,7 +248,7 @@ impl OwnMotor for Motor {
 
     fn wrong_setting(&self) -> Option<WrongSetting> {
         let wrong = |setting, expected, found| {
-            Some(WrongSetting { motor: self.name(), setting, expected, found })
+            Some(WrongSetting::new(self.name(), setting, expected, found))
         };
         match (self.timeout, self.timeout_found) {
             _ if self.state.is_none() => wrong("errorState", 0.0, None),
@@ -283,11 +283,10 @@ impl OwnMotor for Motor {
         let speed = self.velocity().as_rad_per_s() * self.model.torque_constant();
         Vitals {
             temperature_c: Some(drive.temperature_c.into()),
-            error: (errors != 0).then_some(Severity::Fault),
-            error_code: lowest_bit(errors.into()),
             effort: self.mode.0.effort(),
             speed: if supply_v > 0.0 { speed / supply_v } else { 0.0 },
             current: self.turned(current / self.model.max_current_a()),
+            ..Vitals::of_errors([lowest_bit(errors.into())], 0)
         }
     }
 }

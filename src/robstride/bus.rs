@@ -8,8 +8,8 @@ use crate::error::{ConfigError, check};
 use crate::frame::{CanFrame, extended_id};
 use crate::motor::{
     Capabilities, Capability, Claim, Ingest, Inquiry, Laps, MotorName, Order, OwnMotor,
-    Preparation, Role, Settings, Severity, TimeoutUnits, Vitals, WrongSetting, code_from,
-    ingest_eight, register_questions,
+    Preparation, Role, Settings, TimeoutUnits, Vitals, WrongSetting, code_from, ingest_eight,
+    register_questions,
 };
 use crate::time::Duration;
 use crate::units::{Angle, AngularVelocity};
@@ -339,17 +339,14 @@ impl OwnMotor for Motor {
     #[expect(clippy::cast_possible_truncation, reason = "16 bits in tenths")]
     fn vitals(&self) -> Vitals {
         let Some(drive) = self.drive else { return Vitals::default() };
-        let error_code = match (code_from(32, self.reported), drive.fault_code(), drive.status) {
-            (0, 0, Status::Calibration) => CALIBRATION_CODE,
-            (0, code, _) | (code, ..) => code,
-        };
+        let calibrates = CALIBRATION_CODE * u8::from(drive.status == Status::Calibration);
+        let codes = [code_from(32, self.reported), drive.fault_code(), calibrates];
         Vitals {
             temperature_c: Some(drive.temperature_c as i16),
-            error: self.has_fault().then_some(Severity::Fault),
-            error_code,
             effort: self.mode.control.effort(),
             speed: drive.measured.velocity_rad_per_s / self.model.vmax_rad_per_s(),
             current: drive.measured.torque_nm / self.model.tmax_nm(),
+            ..Vitals::of_errors(codes, 0)
         }
     }
 }

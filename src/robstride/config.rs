@@ -14,9 +14,9 @@ pub struct Mode {
     /// The largest current in A, of all modes but the operation mode.
     current_a: f32,
     nm_per_ampere: f32,
-    /// The last current limit sent to the drive: zero at enabling. The limit opens then, and falls with heat, by frames between
-    /// the targets.
-    told_a: Told,
+    /// The share in the last current limit sent to the drive: zero at enabling. The limit opens then, and falls with heat, by frames
+    /// between the targets.
+    limit: Told,
 }
 
 /// The values of `run_mode`; for positions the mode of the model replaces [`POSITION`].
@@ -36,7 +36,7 @@ impl From<ImpedanceControl> for Mode {
 
 impl Mode {
     const fn of(control: ControlMode, current_a: f32, nm_per_ampere: f32) -> Self {
-        Self { control, current_a, nm_per_ampere, told_a: Told::new(0.0) }
+        Self { control, current_a, nm_per_ampere, limit: Told::ZERO }
     }
 
     /// The position mode without a profile (RobStride: CSP, 5; CyberGear: 1): at most so fast, above 0 and at most the
@@ -125,11 +125,10 @@ impl Mode {
 
     /// Returns the target, or the current limit in its place.
     fn limited(&mut self, share: f32, register: Register, target: f32) -> Command {
-        let limit = self.current_a * share;
-        if self.told_a.is_due(limit, PERIOD) {
-            return Command::Write(Register::CurrentLimit, limit);
+        match self.limit.due(share, Told::FINE, PERIOD) {
+            Some(share) => Command::Write(Register::CurrentLimit, self.current_a * share),
+            None => Command::Write(register, target),
         }
-        Command::Write(register, target)
     }
 
     /// Returns a target where the shaft is, for before the drive is enabled. In the operation mode an enabled drive follows the
@@ -148,6 +147,6 @@ impl Mode {
 
     pub(super) const fn reset(&mut self) {
         self.control.reset();
-        self.told_a = Told::new(0.0);
+        self.limit = Told::ZERO;
     }
 }

@@ -8,7 +8,7 @@ use crate::encoder;
 use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::{
-    Capabilities, Capability, Claim, Ingest, Malformed, MotorName, Order, OwnMotor, Role, Severity,
+    Capabilities, Capability, Claim, Ingest, Malformed, MotorName, Order, OwnMotor, Role,
     Tachometer, Vitals, WrongSetting,
 };
 use crate::units::{Angle, AngularVelocity};
@@ -259,12 +259,7 @@ impl OwnMotor for Motor {
 
     fn wrong_setting(&self) -> Option<WrongSetting> {
         let is_unknown = self.has_fault_code && self.feedback.fault.is_none();
-        is_unknown.then(|| WrongSetting {
-            motor: self.name(),
-            setting: "fault code",
-            expected: 0.0,
-            found: None,
-        })
+        is_unknown.then(|| WrongSetting::new(self.name(), "fault code", 0.0, None))
     }
 
     fn forget_settings(&mut self) {
@@ -292,16 +287,14 @@ impl OwnMotor for Motor {
             (Some(driver), Some(motor)) => Some(whole(driver.max(motor))),
             _ => None,
         };
-        let error_code = drive.fault.unwrap_or_default();
         let current = self.model.signed(drive.current_a.unwrap_or_default());
         let current = current / self.model.current_limit_a;
         Vitals {
             temperature_c: celsius,
-            error: (error_code > 0).then_some(Severity::Fault),
-            error_code,
             effort: self.effort.unwrap_or(current),
             speed: self.velocity().as_rad_per_s() / self.model.max_velocity.as_rad_per_s(),
             current,
+            ..Vitals::of_errors([drive.fault.unwrap_or_default()], 0)
         }
     }
 }

@@ -462,10 +462,11 @@ fn a_drive_that_does_not_take_its_mode_is_never_enabled() {
     let mut bench = Bench::with(set.unwrap(), GEAR);
     bench.arm();
     let mut codes = Vec::new();
-    bench.steps(600, |bench| {
+    bench.steps(2_500, |bench| {
         _ = bench.own.set_velocity((), velocity(5.0));
         codes.push(bench.own.motor().vitals().error_code);
         assert_eq!(bench.drive.state(), Heartbeat::IDLE);
+        assert_eq!(bench.drive.watchdog_s(), None, "nothing is written by numbers that are wrong");
     });
     assert!(codes.contains(&63) && !Devices::is_armed(&mut bench.own));
     // One that answers nothing stays idle too.

@@ -76,6 +76,11 @@ impl ControlMode {
         Self { number, follows: Follows::Angle, velocity_limit, torque_limit_nm }
     }
 
+    /// Limits the velocities of the drive's own loop, and of a target that the shaft is to keep.
+    pub(crate) fn within(self, velocity_limit: AngularVelocity) -> Self {
+        Self { velocity_limit: Some(velocity_limit), ..self }
+    }
+
     pub(crate) const fn is_impedance(&self) -> bool {
         matches!(self.follows, Follows::Impedance(_))
     }
@@ -178,11 +183,12 @@ impl ControlMode {
         }
     }
 
-    /// Returns the goal of a shaft that is to keep its present velocity in rad/s.
-    pub(crate) const fn stay(&self, velocity: f32) -> Goal {
+    /// Returns the goal of a shaft that is to keep its present velocity in rad/s, within the limit.
+    pub(crate) fn stay(&self, velocity: f32) -> Goal {
+        let limit = self.most_velocity();
         match self.follows {
             Follows::Impedance(_) | Follows::Torque(_) => Goal::Torque(0.0),
-            Follows::Velocity => Goal::Velocity(velocity),
+            Follows::Velocity => Goal::Velocity(limited(velocity, -limit, limit)),
             Follows::Angle => Goal::Way(0.0),
         }
     }

@@ -64,23 +64,30 @@ struct Missed<R> {
     found: f32,
 }
 
-/// A setting written and read back each time before a drive is enabled. The drive confirms the setting by a value from `least` to `value`.
+/// A setting written and read back, or only read, each time before a drive is enabled. The drive confirms the setting by a value from
+/// `least` to `value`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Preparation<R> {
     pub(crate) setting: R,
     pub(crate) value: f32,
     pub(crate) least: f32,
+    is_written: bool,
 }
 
 impl<R> Preparation<R> {
     /// The drive has to have this value.
     pub(crate) const fn exact(setting: R, value: f32) -> Self {
-        Self { setting, value, least: value }
+        Self { setting, value, least: value, is_written: true }
     }
 
     /// The drive may have a lower limit of its own.
     pub(crate) const fn limit(setting: R, value: f32) -> Self {
-        Self { setting, value, least: 0.0 }
+        Self { setting, value, least: 0.0, is_written: true }
+    }
+
+    /// The drive has to have this value already.
+    pub(crate) const fn found(setting: R, value: f32) -> Self {
+        Self { setting, value, least: value, is_written: false }
     }
 
     fn is_confirmed_by(&self, value: f32) -> bool {
@@ -137,8 +144,12 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
             return Some(self.wait_for(written.setting, Some(written), waits));
         }
         self.preparing = preparations.into_iter().nth(self.prepared.into());
-        let Preparation { setting, value, .. } = self.preparing?;
-        Some(self.ask(Inquiry::Write(setting, value)))
+        let Preparation { setting, value, is_written, .. } = self.preparing?;
+        Some(self.ask(if is_written {
+            Inquiry::Write(setting, value)
+        } else {
+            Inquiry::Read(setting)
+        }))
     }
 
     /// Asks for a setting, and notes a setting that was waited for long enough.
@@ -236,6 +247,15 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
     #[must_use]
     pub const fn asked(&self) -> Option<Inquiry<R>> {
         self.asked
+    }
+
+    /// Takes the value that `read` finds in a frame, if the frame answers the question.
+    pub(crate) fn hear(&mut self, read: impl FnOnce(Inquiry<R>) -> Option<f32>) {
+        if let Some(asked) = self.asked
+            && let Some(value) = read(asked)
+        {
+            self.take(asked, value);
+        }
     }
 
     /// Takes the value in the answer to a question; `false` if the answer is not awaited.

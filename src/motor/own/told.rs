@@ -1,33 +1,38 @@
 //! Frames of a motor between its commands.
 
-/// A value sent to a drive between commands: on a change with every second command at most, and again after so many, for a frame
-/// may be lost.
+/// The share of a limit, sent to a drive between commands: on a change with every second command at most, and again after so many, for
+/// a frame may be lost.
 #[derive(Debug, Default, Clone, Copy)]
 pub(crate) struct Told {
-    value: f32,
+    share: f32,
     /// Commands since then.
     since: u8,
 }
 
 impl Told {
-    /// The drive was told this before the first command.
-    pub(crate) const fn new(value: f32) -> Self {
-        Self { value, since: 1 }
-    }
+    /// Steps of the share, one at least unless the share is zero: coarse for a drive whose commands shall rarely give way to limits.
+    pub(crate) const COARSE: f32 = 16.0;
+    pub(crate) const FINE: f32 = 4_096.0;
 
-    /// Counts a command, and tells whether the value takes its place.
-    pub(crate) fn is_due(&mut self, value: f32, period: u8) -> bool {
+    /// The drive was told zero, or one step, before the first command.
+    pub(crate) const ZERO: Self = Self { share: 0.0, since: 1 };
+
+    /// Counts a command, and returns the share that takes its place, in whole steps.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+    pub(crate) fn due(&mut self, share: f32, steps: f32, period: u8) -> Option<f32> {
         self.since = self.since.saturating_add(1);
-        let has_changed = value.to_bits() != self.value.to_bits();
+        let whole = ((share.min(1.0) * steps) as u16).max(u16::from(share > 0.0));
+        let share = f32::from(whole) / steps;
+        let has_changed = share.to_bits() != self.share.to_bits();
         let is_due = self.since > if has_changed { 1 } else { period };
         if is_due {
-            *self = Self { value, since: 0 };
+            *self = Self { share, since: 0 };
         }
-        is_due
+        is_due.then_some(share)
     }
 
-    pub(crate) const fn value(self) -> f32 {
-        self.value
+    pub(crate) const fn share(self) -> f32 {
+        self.share
     }
 
     /// Returns how many commands were counted since the drive was told.

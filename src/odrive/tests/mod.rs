@@ -3,7 +3,7 @@
 use super::command::{endpoint, request};
 use super::feedback::endpoint_value;
 use super::*;
-use crate::motor::{Form, lowest_bit};
+use crate::motor::{Form, Inquiry, lowest_bit};
 
 /// can-protocol.csv of 0.5.6; the bytes of 0x07, 0x0C and 0x0D are those of `tests/data/wire`.
 #[test]
@@ -54,9 +54,10 @@ fn an_endpoint_is_asked_for_and_written_as_in_the_example_of_the_documentation()
     let write = endpoint(0, (0x0102, Form::F32), Some(0.1));
     assert_eq!(std::format!("{write:?}"), "004 [8] 01 02 01 00 CD CC CC 3D");
     let answer = [0, 0x34, 0x12, 0, 1, 0, 0, 0];
-    assert_eq!(endpoint_value(&answer, 5, 0x1234), Some([1, 0, 0, 0]));
-    assert_eq!(endpoint_value(&answer, 4, 0x1234), None, "no value");
-    assert_eq!(endpoint_value(&answer, 5, 0x1235), None, "of another endpoint");
+    let read = |number| Inquiry::Read((number, Form::U8));
+    assert_eq!(endpoint_value(&answer, 5, read(0x1234)), Some(1.0));
+    assert_eq!(endpoint_value(&answer, 4, read(0x1234)), None, "no value");
+    assert_eq!(endpoint_value(&answer, 5, read(0x1235)), None, "of another endpoint");
 }
 
 #[test]
