@@ -1,3 +1,5 @@
+// A link of the README that leads to a page on the web page of the repository, and here to a module.
+#![cfg_attr(doc, doc = "[guide]: guide")]
 #![doc = include_str!("../README.md")]
 #![no_std]
 #![cfg_attr(docsrs, feature(doc_cfg))]
@@ -19,6 +21,9 @@ mod pages {
     #[doc = include_str!("../docs/robot.md")]
     mod robot {}
 }
+
+#[cfg(any(doc, doctest))]
+pub mod guide;
 
 // F0: vocabulary
 pub mod error;

@@ -124,14 +124,55 @@ fn outline(page: &str) -> Vec<String> {
     outline
 }
 
+/// Compares two pages by their outlines; returns how many lines an outline has.
+fn compare(english: &str, chinese: &str) -> usize {
+    let (ours, theirs) = (outline(&page(english)), outline(&page(chinese)));
+    for (ours, theirs) in ours.iter().zip(&theirs) {
+        assert_eq!(ours, theirs, "{chinese}");
+    }
+    assert_eq!(ours.len(), theirs.len(), "{chinese}");
+    ours.len()
+}
+
 #[test]
 fn the_chinese_readme_has_the_headings_tables_and_code_of_the_english_one() {
-    let (english, chinese) = (outline(&page("README.md")), outline(&page("README.zh-CN.md")));
-    assert!(english.len() > 120, "{} lines", english.len());
-    for (ours, theirs) in english.iter().zip(&chinese) {
-        assert_eq!(ours, theirs);
+    let lines = compare("README.md", "README.zh-CN.md");
+    assert!(lines > 120, "{lines} lines");
+}
+
+/// The names of the files of a folder with this extension, sorted.
+fn names(folder: &str, extension: &str) -> Vec<String> {
+    let entries = fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join(folder)).unwrap();
+    let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let mut names: Vec<_> = names.filter(|name| name.ends_with(extension)).collect();
+    names.sort_unstable();
+    names
+}
+
+#[test]
+fn each_chinese_chapter_has_the_headings_tables_and_code_of_the_english_one() {
+    let chapters = names("docs/guide", ".md");
+    assert_eq!(chapters, names("docs/guide/zh-CN", ".md"));
+    assert_eq!(chapters.len(), 8, "seven chapters and their list");
+    for name in chapters {
+        let lines = compare(&format!("docs/guide/{name}"), &format!("docs/guide/zh-CN/{name}"));
+        assert!(lines > 20, "{name}: {lines} lines");
     }
-    assert_eq!(english.len(), chinese.len());
+}
+
+/// Later chapters include the files; a reader has the chapters alone.
+#[test]
+fn each_file_of_the_robot_of_the_guide_is_a_block_of_code_of_one_chapter() {
+    let chapters = names("docs/guide", ".md").into_iter();
+    let chapters: Vec<_> = chapters.map(|name| page(&format!("docs/guide/{name}"))).collect();
+    let files = names("docs/guide/robot", ".rs");
+    for name in &files {
+        let block = format!("{}```\n", page(&format!("docs/guide/robot/{name}")));
+        let shown = chapters.iter().filter(|chapter| chapter.contains(&block)).count();
+        assert_eq!(shown, 1, "{name}");
+    }
+    let blocks: usize = chapters.iter().map(|chapter| chapter.matches("```rust").count()).sum();
+    assert_eq!(blocks, files.len());
 }
 
 #[test]
@@ -159,19 +200,32 @@ fn each_readme_has_at_most_200_lines() {
     }
 }
 
-/// The addresses of the links of a page, without those to other sites and to headings.
+/// The addresses of the links of a page, also of its link definitions, without those to other sites and to headings.
 fn links(page: &str) -> Vec<&str> {
-    let addresses = page.split("](").skip(1).filter_map(|rest| rest.split([')', '#']).next());
+    let inline = page.split("](").skip(1).filter_map(|rest| rest.split([')', '#']).next());
+    let definitions = page.lines().filter(|line| line.starts_with('['));
+    let definitions = definitions.filter_map(|line| line.split_once("]: ")?.1.split('#').next());
+    let addresses = inline.chain(definitions);
     addresses.filter(|address| !address.is_empty() && !address.contains("://")).collect()
+}
+
+/// The words in square brackets that stand for a link definition, and the definitions.
+fn references(page: &str) -> (Vec<&str>, Vec<&str>) {
+    let used = page.split("][").skip(1).filter_map(|rest| rest.split(']').next());
+    let definitions = page.lines().filter_map(|line| line.strip_prefix('[')?.split_once("]: "));
+    (used.collect(), definitions.map(|(name, _)| name).collect())
 }
 
 #[test]
 fn every_link_of_the_pages_leads_to_a_file_and_every_page_is_linked() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let names =
-        |entry: std::io::Result<fs::DirEntry>| entry.unwrap().file_name().into_string().unwrap();
-    let docs: Vec<String> = fs::read_dir(root.join("docs")).unwrap().map(names).collect();
-    let pages = docs.iter().filter(|name| name.ends_with(".md")).map(|name| format!("docs/{name}"));
+    let files = |folder: &str, extension| {
+        let names = names(folder, extension).into_iter();
+        names.map(|name| format!("{folder}/{name}")).collect::<Vec<_>>()
+    };
+    let folders = ["docs", "docs/guide", "docs/guide/zh-CN"];
+    let docs = folders.map(|folder| files(folder, ".md")).concat();
+    let pages = docs.iter().cloned();
     let mut linked = Vec::new();
     let top = ["README.md", "README.zh-CN.md", "CONTRIBUTING.md", "DESIGN.md"];
     for path in top.map(ToOwned::to_owned).into_iter().chain(pages) {
@@ -181,10 +235,21 @@ fn every_link_of_the_pages_leads_to_a_file_and_every_page_is_linked() {
             assert!(target.exists(), "{path}: {address} is not there");
             linked.push(target.canonicalize().unwrap());
         }
+        if path.contains("guide/") {
+            let (used, defined) = references(&text);
+            assert!(!used.is_empty(), "{path}");
+            for name in used {
+                assert!(defined.contains(&name), "{path}: [{name}] is not defined");
+            }
+        }
     }
-    for name in docs {
-        let file = root.join("docs").join(&name).canonicalize().unwrap();
-        assert!(linked.contains(&file), "no page links docs/{name}");
+    for path in docs.into_iter().chain(files("docs", ".svg")) {
+        let file = root.join(&path).canonicalize().unwrap();
+        assert!(linked.contains(&file), "no page links {path}");
     }
-    assert_eq!(links("[a](docs/a.md#part), [b](https://b), [c](#c)"), ["docs/a.md"]);
+    assert_eq!(
+        links("[a](docs/a.md#part), [b](https://b), [c](#c)\n[d]: d.md#e"),
+        ["docs/a.md", "d.md"]
+    );
+    assert_eq!(references("[a][b], [c](d)\n[b]: e.md"), (vec!["b"], vec!["b"]));
 }
