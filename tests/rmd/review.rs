@@ -1,56 +1,7 @@
-//! What could hurt: frames that are drawn. `tests/families` has the frames after the motor was told to rest, at every moment.
+//! Findings of reviews. `tests/families` has the frames after the motor was told to rest, at every moment, and the fuzz target `drives`
+//! drawn frames.
 
 use super::*;
-
-/// Frames of a motor at rest, by the manual alone: off, the lock of the brake, questions, and a torque without current.
-fn is_rest(frame: &CanFrame) -> bool {
-    let [code, rest @ ..] = *frame.bytes();
-    [0x78, 0x80, 0x92, 0x9A, 0x9C, 0xA1].contains(&code) && rest == [0; 7]
-}
-
-/// Frames that are drawn, on the id of the drive, while it drives and while it rests: a disarmed motor sends frames of rest alone, and
-/// a driven one no current beyond its limit.
-#[test]
-fn drawn_frames_drive_nothing() {
-    let mut state = 0x2545_F491_4F6C_DD1D_u64;
-    let mut draw = || {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        state
-    };
-    let codes = [0x77, 0x80, 0x92, 0x9A, 0x9C, 0xA1, 0xA2, 0xA4, 0xA8, 0xB3, 0xF1, 0x00];
-    let limit = 4.0 / MODEL.torque_constant() * 100.0;
-    for is_armed in [false, true] {
-        let mut bench = Bench::new(MODEL, torque());
-        bench.steps(100, |_| {});
-        for _ in 0..20_000 {
-            let mut data = draw().to_le_bytes();
-            data[0] = codes[usize::from(data[0]) % codes.len()];
-            if draw() % 4 == 0 {
-                data = [data[0], 0, 0, 0, 0, 0, 0, 0];
-            }
-            let now = bench.now();
-            _ = Devices::ingest(&mut bench.own, &answer(data), now);
-            if is_armed {
-                _ = bench.own.arm(bench.now());
-                _ = bench.own.set_angle((), rad(1.0));
-            }
-            bench.now_us += 1_000;
-            let now = bench.now();
-            bench.own.update(Tick::new(now, 0.001));
-            while let Some(sent) = bench.own.next_frame(0) {
-                let [code, _, _, _, a, b, _, _] = *sent.bytes();
-                let current = f32::from(i16::from_le_bytes([a, b]));
-                assert!(is_armed || is_rest(&sent), "{sent:?}");
-                assert!(code != 0xA1 || current.abs() <= limit, "{sent:?}");
-                if let Some(answer) = bench.drive.hear(&sent) {
-                    _ = Devices::ingest(&mut bench.own, &answer, now);
-                }
-            }
-        }
-    }
-}
 
 /// 0 in the field of the limit stands for none, and the share of the output is 0 right after arming.
 #[test]
