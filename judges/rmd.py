@@ -14,6 +14,9 @@ from program import Conversation
 ANSWERS = 0x241
 RELEASE, OFF, STOP, READ = 0x77, 0x80, 0x81, 0x9C
 
+# The torque of an ampere of the RMD-X8-120, in Nm.
+CONSTANT = 2.4
+
 # The differences that README.md explains.
 COARSE = "angles that the judge reads in hundredths of a degree"
 
@@ -189,7 +192,46 @@ class Motorbridge:
         self.exchange()
 
 
-MASTERS = {judge.name: judge for judge in (Motorbridge, NekoRmd)}
+class PyLkMotor(lk.PyLkMotor):
+    """pylkmotor: LK-TECH's frames, of which torque, off, the question for feedback and feedback itself are those of MyActuator."""
+
+    codes = [TORQUE]
+    feedback = [READ, TORQUE, VELOCITY, POSITION, 0xA8]
+    #: Its currents have 16 bits.
+    most = 32_767
+
+    def __init__(self):
+        super().__init__()
+        self.verbs = {OFF: self.motor.motor_shutdown, READ: self.motor.read_motor_status_2}
+
+    def commands(self, rows):
+        torque = self.motor.torque_loop_control
+        for _, _, value in rows:
+            torque(value)
+        sent = self.bus.drain()
+        require(all(identifier == 0x141 for identifier, _ in sent), "another id")
+        return b"".join(data for _, data in sent)
+
+    def decode(self, frames, _ours):
+        read = self.motor._parse_response_2
+        return np.array([read(frames[at : at + 8]) for at in range(0, len(frames), 8)], np.int64)
+
+    def frame(self, code):
+        self.verbs[code]()
+        return self.bus.drain()[0]
+
+    # The simulated drive
+
+    def connect(self, hear):
+        def respond(identifier, data):
+            answers = hear(identifier, data)
+            return Frame(answers[0][1]) if answers else None
+
+        self.bus.respond = respond if hear else None
+        self.bus.answer = None
+
+
+MASTERS = {judge.name: judge for judge in (Motorbridge, NekoRmd, PyLkMotor)}
 
 
 class Trial(lk.Trial):
@@ -198,6 +240,8 @@ class Trial(lk.Trial):
         ("motorbridge", "decode"): {COARSE},
         ("nekormd", "encode"): set(),
         ("nekormd", "decode"): set(),
+        ("pylkmotor", "encode"): set(),
+        ("pylkmotor", "decode"): set(),
     }
 
     def encode(self):
@@ -210,7 +254,7 @@ class Trial(lk.Trial):
         values >>= random.integers(0, judge.most.bit_length(), count)
         ends = np.array([0, 1, -1, 255, 256, judge.most, -judge.most])
         rows["value"] = np.where(random.integers(0, 20, count) == 0, random.choice(ends, count), values)
-        rows["limit"] = np.where(rows["code"] == VELOCITY, 0, random.integers(0, 65_536, count))
+        rows["limit"] = np.where(rows["code"] == POSITION, random.integers(0, 65_536, count), 0)
         ours = np.frombuffer(self.program.run("rmd", "encode", data=rows.tobytes()), np.uint8)
         listed = list(zip(*(rows[name].tolist() for name in ("code", "limit", "value"))))
         theirs = np.frombuffer(judge.commands(listed), np.uint8)
@@ -265,6 +309,8 @@ class Trial(lk.Trial):
         with Conversation([self.program.path, "rmd", "serve", *self.program.plant]) as self.wire:
             judge.connect(self.wire.hear)
             try:
+                if judge.name == "pylkmotor":
+                    return self.drive_by_torques(judge.motor)
                 judge.tell(RELEASE)
                 for speed in self.random.integers(-300, 300, 20).tolist():
                     judge.turn(speed)
@@ -294,6 +340,24 @@ class Trial(lk.Trial):
                     self.near(self.shaft()[2], 0, 0, "torque with an error")
             finally:
                 judge.connect(None)
+
+    def drive_by_torques(self, motor):
+        for current in self.random.integers(-300, 300, 200).tolist():
+            motor.torque_loop_control(current)
+            self.wire.ask("step 0.01")
+            _, found, velocity, angle = motor.read_motor_status_2()
+            turned, turning, torque = self.shaft()[:3]
+            self.near(found, current, 1, "current")
+            self.near(torque, current * CONSTANT / 100, CONSTANT / 100, "torque")
+            self.near(velocity, np.degrees(turning), 1.001, "velocity")
+            self.near(angle, np.degrees(turned), 1.001, "angle")
+        motor.motor_shutdown()
+        self.wire.ask("step 0.1")
+        self.near(self.shaft()[2], 0, 0, "torque when off")
+        motor.torque_loop_control(500)
+        self.wire.ask("fail 16")
+        self.wire.ask("step 0.1")
+        self.near(self.shaft()[2], 0, 0, "torque with an error")
 
 
 if __name__ == "__main__":

@@ -96,8 +96,6 @@ class CyberGear:
     models = ["CyberGear"]
     parameters = [row for row in PARAMETERS if row[0] != 0x7028]
     top = 65_535
-    #: One command and frame in so many: a frame takes it some microseconds.
-    share = 1
     rule = Rule(False, DOUBLE)
 
     def __init__(self):
@@ -167,7 +165,6 @@ class CyberGear:
 
 class CyberGearDriver(CyberGear):
     name = "cybergeardriver"
-    share = 2
     #: Enabling names no host, which is host 0.
     host = 0
     #: By their names it writes the limits of the parameter table, with a frame of the maker's tool.
@@ -217,7 +214,6 @@ class CyberGearDriver(CyberGear):
 class PythonCyberGear(CyberGear):
     name = "python-cybergear"
     host = HOST
-    share = 5
 
     def __init__(self):
         from cybergear import cybergear
@@ -272,7 +268,6 @@ class RobstrideDynamics:
     """robstride-dynamics, the SDK of the maker, in Python. Its bus is an object with `send` and `recv`."""
 
     name = "robstride-dynamics"
-    share = 1
     models = [f"RS0{number}" for number in range(7)]
     parameters = PARAMETERS
     top = 65_534
@@ -403,7 +398,6 @@ class Motorbridge:
     """motorbridge, in Rust as a shared library, over its CAN socket: `socketcan.c` has the other end."""
 
     name = "motorbridge"
-    share = 1
     models = [f"RS0{number}" for number in range(7)]
     parameters = PARAMETERS
     top = 65_534
@@ -576,7 +570,7 @@ class Trial:
     """A judge and the program."""
 
     def __init__(self, judge, path, defect=None, count=1_000_000, seed=1):
-        self.judge, self.count, self.is_whole = judge, count // judge.share, count >= 1_000_000
+        self.judge, self.count, self.is_whole = judge, count, count >= 1_000_000
         self.program = Program(path, defect)
         self.random = np.random.default_rng(seed)
         self.models = {
