@@ -82,10 +82,10 @@ impl Wide {
     /// Returns the square root, and zero of a negative number.
     #[inline]
     pub(super) fn root(self) -> Self {
-        if self.high.is_nan() || self.high <= 0.0 {
+        let high = math::quick_root(self.high);
+        if high <= 0.0 {
             return Self::ZERO;
         }
-        let high = math::sqrt(self.high);
         let rest = self - Self::of(high).squared();
         Self::renewed(high, 0.5 * rest.high / high)
     }

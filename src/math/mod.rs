@@ -25,8 +25,8 @@ pub(crate) mod tests;
 mod trigonometry;
 mod wrap;
 
-pub(crate) use root::cube_root;
 pub use root::sqrt;
+pub(crate) use root::{cube_root, quick_root};
 pub use trigonometry::{atan2, sin_cos};
 pub(crate) use wrap::rest;
 pub use wrap::{wrap, wrap_pi, wrap_positive, wrap_tau};

@@ -35,23 +35,34 @@ pub(crate) const fn cube_root(x: f32) -> f32 {
     (2.0 * root + x / (root * root)) * (1.0 / 3.0)
 }
 
-/// Halves the exponent for a start with an error of 4 % at most, then squares the error three times.
+/// Returns the square root of a positive `x`, to one unit in the last place, and 0 for every `x` that is not above 1.2e-38.
+///
+/// A third of the instructions of [`sqrt`]: half of the exponent for an inverse root with an error of 3.5 % at most, two steps of
+/// Newton's rule without a division, and one for the root itself.
+#[inline]
+pub(crate) const fn quick_root(x: f32) -> f32 {
+    if x.is_nan() || x <= f32::MIN_POSITIVE {
+        return 0.0;
+    }
+    let half = 0.5 * x;
+    let mut inverse = f32::from_bits(0x5F37_59DF - (x.to_bits() >> 1));
+    inverse *= 1.5 - half * inverse * inverse;
+    inverse *= 1.5 - half * inverse * inverse;
+    let root = x * inverse;
+    root + 0.5 * inverse * (x - root * root)
+}
+
+/// The same for every `x`.
 #[cfg(any(test, not(feature = "libm")))]
 const fn newton(x: f32) -> f32 {
-    const SUBNORMAL_SCALE: f32 = 16_777_216.0; // 4096 squared
+    const SCALE: f32 = 16_777_216.0; // 4096 squared
     if x < 0.0 {
         return f32::NAN;
     }
     if !(x > 0.0 && x < f32::INFINITY) {
         return x; // zero, infinity, NaN
     }
-    let subnormal = x < f32::MIN_POSITIVE;
-    let scaled = if subnormal { x * SUBNORMAL_SCALE } else { x };
-    let mut root = f32::from_bits((scaled.to_bits() >> 1) + 0x1FBB_4F2E);
-    root = 0.5 * (root + scaled / root);
-    root = 0.5 * (root + scaled / root);
-    root = 0.5 * (root + scaled / root);
-    if subnormal { root / 4096.0 } else { root }
+    if x <= f32::MIN_POSITIVE { quick_root(x * SCALE) / 4096.0 } else { quick_root(x) }
 }
 
 #[cfg(test)]

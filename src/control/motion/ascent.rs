@@ -1,4 +1,4 @@
-use crate::control::motion::roots::{lesser, root, root_of};
+use crate::control::motion::roots::{lesser, reach, root};
 use crate::control::motion::task::Task;
 use crate::control::number::limited;
 use crate::control::wide::Wide;
@@ -32,7 +32,7 @@ impl Slope {
         if change >= 1.0 {
             Self { root: 1.0, hold: change - 1.0 }
         } else {
-            Self { root: root_of(change), hold: 0.0 }
+            Self { root: math::quick_root(change), hold: 0.0 }
         }
     }
 
@@ -135,7 +135,7 @@ impl Ascent {
         let (small, large) =
             if rise < 0.0 { (self.entry, self.exit) } else { (self.exit, self.entry) };
         let (low, high) = (small.narrow(), large.narrow());
-        let border = root_of(1.0 - gap);
+        let border = math::quick_root(1.0 - gap);
         let start = if rise < 0.0 { self.acceleration } else { 0.0 };
         if start < 0.0
             && let Some(curve) = self.falling(beginning, small, large, border)
@@ -177,7 +177,7 @@ impl Ascent {
         let holds_first = start < -border || gap >= 1.0;
         if holds_first {
             let end = -border;
-            let longest = 0.25 * (-1.0 - root_of(1.0 - 16.0 * low));
+            let longest = 0.25 * (-1.0 - math::quick_root(1.0 - 16.0 * low));
             let longest =
                 if low < 0.0625 && longest > start && longest < end { longest } else { end };
             let crest = low + longest * longest;
@@ -194,7 +194,8 @@ impl Ascent {
             let sum = low + high;
             let square = sum * sum - 0.75 * gap * gap;
             if sum < 0.0 && square > 0.0 {
-                let longest = math::sqrt(gap * gap / (2.0 * (math::sqrt(square) - sum)));
+                let longest =
+                    math::quick_root(gap * gap / (2.0 * (math::quick_root(square) - sum)));
                 let first = self.lowest(beginning, holds_first, border);
                 let reached =
                     longest * (0.25 * longest * longest + sum) - 0.25 * gap * gap / longest;
@@ -215,17 +216,24 @@ impl Ascent {
             let other = if s > 0.0 { 0.5 * self.rise / s } else { 0.0 };
             0.75 * s * s + sum + other * other
         };
+        let (way, end) = (self.way.narrow(), rest.narrow());
         let lowest = self.lowest(beginning, is_late, border);
         let highest = if highest > lowest { highest } else { lowest };
-        let mut guess = highest;
-        if sum >= 0.0 && !is_late {
-            // The way grows at least as that of the cube, and as its slope there.
-            let (Beginning::Up(beyond) | Beginning::Down(beyond)) = beginning;
-            let by_cube = lowest + math::cube_root(4.0 * beyond);
-            let by_slope = lowest + beyond / slope_at(lowest);
-            guess = lesser(by_slope, lesser(by_cube, guess));
+        let (Beginning::Up(beyond) | Beginning::Down(beyond)) = beginning;
+        // Beyond `base`, where no slope is taken off, the way bends upward by the sum at least, and grows by a quarter of its cube.
+        let (mut base, mut depth) = (lowest, beyond);
+        if self.rise < 0.0 && self.acceleration < 0.0 {
+            base = math::quick_root(-self.rise);
+            depth = way - base * sum;
         }
-        let (way, end) = (self.way.narrow(), rest.narrow());
+        let mut guess = lesser(base, highest);
+        if depth >= 0.0 && base < highest {
+            let slope = slope_at(base);
+            guess = lesser(base + reach(depth, slope, base), highest);
+            if slope >= 0.0 {
+                guess = lesser(base + math::cube_root(4.0 * depth), guess);
+            }
+        }
         let guess = root::<ROUGH_STEPS>([lowest, highest], guess, ROUGH, |s| {
             ((s * (0.25 * s * s + sum) - way) * s + end, s * slope_at(s))
         });
@@ -244,9 +252,9 @@ impl Ascent {
         }
         let acceleration = self.acceleration;
         match beginning {
-            Beginning::Up(_) => root_of(self.rise),
+            Beginning::Up(_) => math::quick_root(self.rise),
             Beginning::Down(_) => {
-                let second = root_of(acceleration * acceleration - self.rise);
+                let second = math::quick_root(acceleration * acceleration - self.rise);
                 if acceleration >= 0.0 {
                     acceleration + second
                 } else {
@@ -271,13 +279,17 @@ impl Ascent {
     fn holding(&self, small: Wide, large: Wide, from: f32, to: f32) -> Curve {
         let fixed = small.squared() - large.squared() + small + large;
         let (fixed, double) = (fixed.scaled(0.5) - self.way, small.scaled(2.0));
-        let (low, top) = (small.narrow(), root_of(self.top - small.narrow()));
+        let (low, top) = (small.narrow(), math::quick_root(self.top - small.narrow()));
         let to = limited(top, from, to);
         let slope_at = |r: f32| (r + 1.0) * (2.0 * r * r + r + 2.0 * low);
         let end = fixed.narrow();
-        let guess = root::<ROUGH_STEPS>([from, to], to, ROUGH, |r| {
-            ((((0.5 * r + 1.0) * r + low + 0.5) * r + 2.0 * low) * r + end, slope_at(r))
-        });
+        let value_at = |r: f32| (((0.5 * r + 1.0) * r + low + 0.5) * r + 2.0 * low) * r + end;
+        let bend = (6.0 * from + 6.0) * from + 2.0 * low + 1.0;
+        let mut guess = to;
+        if from >= 0.0 && bend > 0.0 {
+            guess = lesser(from + reach(-value_at(from), slope_at(from), bend), to);
+        }
+        let guess = root::<ROUGH_STEPS>([from, to], guess, ROUGH, |r| (value_at(r), slope_at(r)));
         let r = root::<EXACT_STEPS>([from, to], guess, EXACT, |r| {
             let value = ((Wide::of(0.5 * r) + 1.0) * r + (small + 0.5)) * r + double;
             ((value * r + fixed).narrow(), slope_at(r))
@@ -340,7 +352,7 @@ impl Ascent {
         if rolled.first.root <= 1.0 && rolled.second.root <= 1.0 {
             return rolled;
         }
-        let root = root_of(total - gap) - 1.0;
+        let root = math::quick_root(total - gap) - 1.0;
         if root <= 1.0 {
             return self.held_by(root);
         }

@@ -1,14 +1,15 @@
 use crate::control::number::limited;
 use crate::math;
 
-/// Returns the square root, and zero of a negative number.
-pub(super) fn root_of(x: f32) -> f32 {
-    if x > 0.0 { math::sqrt(x) } else { 0.0 }
-}
-
 /// Returns the lesser one of two, and the second if the first is NaN.
 pub(super) const fn lesser(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
+}
+
+/// Returns how far away a function passes zero at most, that is below zero by `depth` and bends upward by `bend` at least.
+pub(super) fn reach(depth: f32, slope: f32, bend: f32) -> f32 {
+    let root = math::quick_root(slope * slope + 2.0 * bend * depth);
+    if slope > 0.0 { 2.0 * depth / (slope + root) } else { (root - slope) / bend }
 }
 
 /// Finds where a function passes zero upward, which it does once between `low` and `high`.
