@@ -135,7 +135,7 @@ def errors(found, expected, loads):
     require(found.shape == expected.shape and np.isfinite(found).all(), "efforts are missing")
     off = np.abs(found - expected)
     large = np.abs(expected) > 0.01 * loads
-    return (off[large] / np.abs(expected[large])).max(), (off / loads).max()
+    return (off[large] / np.abs(expected[large])).max(), (off / loads).max(), int(large.sum())
 
 
 def main():
@@ -153,10 +153,10 @@ def main():
     random = np.random.default_rng([options.seed, 6])
     batches = [case(random) for _ in range(max(1, options.count // ARMS))]
     words, expected, loads = (np.concatenate(parts) for parts in zip(*batches, strict=True))
-    own, small = errors(ours(options.program, words), expected, loads)
+    own, small, large = errors(ours(options.program, words), expected, loads)
     require(own <= OWN and small <= SMALL, f"an effort is off by {own:.1e} of itself, {small:.1e} of the load")
     name = f"MuJoCo {mujoco.__version__}"
-    figure("arms", "effort above a hundredth of the load, as a share of itself", name, len(expected), OWN, own, "hold")
+    figure("arms", "effort above a hundredth of the load, as a share of itself", name, large, OWN, own, "hold")
     figure("arms", "any effort, as a share of the load", name, len(expected), SMALL, small, "hold")
     for defect in DEFECTS:
         found = errors(ours(options.program, words, "--plant", defect), expected, loads)

@@ -13,6 +13,7 @@
 //! drivetrain-judges odrive VERB           see `odrive`
 //! drivetrain-judges motion ...            plans of `control::Motion`: see `motion`
 //! drivetrain-judges state-space ...       gains and filters of `control::state_space`: see `state_space`
+//! drivetrain-judges power STEPS           fits of the power model of a chassis: see `power`
 //! drivetrain-judges manipulator ...       efforts that hold an arm: see `manipulator`
 //! drivetrain-judges simulator             runs of the simulator: see `simulator`
 //! drivetrain-judges balance               the program of a robot that balances: see `balance`
@@ -27,6 +28,7 @@ mod lk;
 mod manipulator;
 mod motion;
 mod odrive;
+mod power;
 mod rmd;
 mod robstride;
 mod serve;
@@ -104,6 +106,7 @@ fn run(arguments: &[&str]) -> Outcome<()> {
         ["odrive", rest @ ..] => odrive::run(rest, input, &mut output)?,
         ["motion", rest @ ..] => motion::run(rest, input, &mut output)?,
         ["state-space", rest @ ..] => state_space::run(rest, input, &mut output)?,
+        ["power", rest @ ..] => power::run(rest, input, &mut output)?,
         ["manipulator", rest @ ..] => manipulator::run(rest, input, &mut output)?,
         ["simulator", rest @ ..] => simulator::run(rest, input, &mut output)?,
         ["balance", rest @ ..] => balance::run(rest, input, &mut output)?,
