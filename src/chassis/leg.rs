@@ -91,6 +91,8 @@ impl FiveBar {
     ///
     /// `None` if the bars cannot close, are within 3 % of their stretched or folded position, where forces have no bound, or if an argument is NaN or
     /// infinite.
+    ///
+    /// Costs 522 instructions on a Cortex-M4F, with the torques of a force (`docs/figures.md`).
     #[must_use]
     pub fn state(
         &self,

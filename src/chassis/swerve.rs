@@ -128,7 +128,7 @@ impl<const N: usize> Swerve<N> {
     /// Returns the state of each module for the motion `twist` of the body: velocities of zero or more, angles in
     /// -180..=180 degrees. A module at rest has the angle 0.
     ///
-    /// Costs 636 instructions on a Cortex-M4F, for four modules (`docs/figures.md`).
+    /// Costs 513 instructions on a Cortex-M4F, for four modules (`docs/figures.md`).
     #[must_use]
     pub fn inverse(&self, twist: Twist<Body>) -> [ModuleState; N] {
         self.positions_m.map(|position| {

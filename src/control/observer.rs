@@ -93,7 +93,7 @@ impl LoadObserver {
     /// Takes one feedback: the measured speed in rad/s and the torque of the motor in Nm, both of the output shaft, and the
     /// seconds since the feedback before.
     ///
-    /// Costs 106 instructions on a Cortex-M4F (`docs/figures.md`).
+    /// Costs 88 instructions on a Cortex-M4F (`docs/figures.md`).
     ///
     /// # Examples
     /// ```

@@ -310,7 +310,9 @@ impl<B, const N: usize> Bus<B, N> {
     /// `dt_s` of zero, below zero, infinite or NaN changes nothing, and keeps the last commands for one update, except those of relaxed
     /// motors. A second such update in a row, or a late one, sends zeros. Above 20 ms, integrals and derivatives rest for the step.
     ///
-    /// Costs 508 instructions on a Cortex-M4F, with 8 speed loops (`docs/figures.md`).
+    /// Costs 505 instructions on a Cortex-M4F, with 8 speed loops (`docs/figures.md`).
+    ///
+    /// Costs 777 instructions on a Cortex-M4F, with 8 position and speed loops (`docs/figures.md`).
     pub fn update(&mut self, tick: Tick) {
         let before = self.motors.guard.begin(tick.now());
         let Some(step) = TimeStep::usable(tick.dt_s(), TimeStep::MOTOR_MAX_S) else {

@@ -50,7 +50,7 @@ pub const fn sin_cos(x: f32) -> (f32, f32) {
 /// from 1e-15 to 1e15, and on the negative x axis either of ±π. The zero vector has the angle 0. NaN in either argument
 /// gives NaN; infinity may give NaN.
 ///
-/// Costs 69 instructions on a Cortex-M4F (`docs/figures.md`).
+/// Costs 63 instructions on a Cortex-M4F (`docs/figures.md`).
 ///
 /// # Examples
 /// ```

@@ -9,6 +9,10 @@ use crate::units::AngularVelocity;
 
 /// A motor of this family in a control mode: see the [module](super).
 ///
+/// Costs 6915 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
+///
+/// Costs 160 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
+///
 /// # Examples
 /// ```
 /// use drivetrain::motor::{Claim, OwnMotor};

@@ -131,7 +131,7 @@ impl SpeedActuator {
 
     /// Steps by a validated time step, and returns the output.
     ///
-    /// Costs 89 instructions on a Cortex-M4F, without filters (`docs/figures.md`).
+    /// Costs 80 instructions on a Cortex-M4F, without filters (`docs/figures.md`).
     pub fn step(&mut self, setpoint: f32, speed: f32, step: &TimeStep) -> f32 {
         if step.is_hold() || !setpoint.is_finite() || !speed.is_finite() {
             self.pid.refuse(!step.is_hold());

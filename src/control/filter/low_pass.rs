@@ -55,7 +55,7 @@ impl LowPass {
 
     /// Steps by `dt_s` seconds and returns the new value.
     ///
-    /// Costs 38 instructions on a Cortex-M4F (`docs/figures.md`).
+    /// Costs 30 instructions on a Cortex-M4F (`docs/figures.md`).
     #[inline]
     pub const fn update(&mut self, input: f32, dt_s: f32) -> f32 {
         self.step(input, &TimeStep::new(dt_s, f32::MAX))

@@ -143,7 +143,7 @@ impl Identification {
 
     /// Takes one tick: the effort that is sent now, the speed in `M`/s that is measured now, and the seconds since the tick before.
     ///
-    /// Costs 1521 instructions on a Cortex-M4F, in motion (`docs/figures.md`).
+    /// Costs 1523 instructions on a Cortex-M4F, in motion (`docs/figures.md`).
     pub fn sample(&mut self, effort: f32, velocity: f32, dt_s: f32) {
         let step = TimeStep::of(dt_s);
         if !step.admits(effort.is_finite() && velocity.is_finite(), &mut self.rejected) {

@@ -95,7 +95,7 @@ impl SlewLimiter {
 
     /// Steps by `dt_s` seconds towards `target` and returns the new value.
     ///
-    /// Costs 74 instructions on a Cortex-M4F (`docs/figures.md`).
+    /// Costs 72 instructions on a Cortex-M4F (`docs/figures.md`).
     pub const fn update(&mut self, target: f32, dt_s: f32) -> f32 {
         let step = TimeStep::new(dt_s, self.max_step_s);
         if step.admits(target.is_finite(), &mut self.rejected) {

@@ -148,7 +148,7 @@ impl RelayTuner {
 
     /// Steps by `dt_s` seconds and returns the output for the plant.
     ///
-    /// Costs 142 instructions on a Cortex-M4F (`docs/figures.md`).
+    /// Costs 125 instructions on a Cortex-M4F (`docs/figures.md`).
     pub fn update(&mut self, setpoint: f32, measurement: f32, dt_s: f32) -> f32 {
         let step = TimeStep::of(dt_s);
         let error = number::finite(setpoint - measurement);

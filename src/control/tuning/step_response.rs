@@ -81,7 +81,7 @@ impl StepResponse {
 
     /// Takes the value `dt_s` seconds after the last value; the first, `dt_s` after the step.
     ///
-    /// Costs 72 instructions on a Cortex-M4F (`docs/figures.md`).
+    /// Costs 68 instructions on a Cortex-M4F (`docs/figures.md`).
     pub fn record(&mut self, value: f32, dt_s: f32) {
         if self.is_complete() {
             return;
