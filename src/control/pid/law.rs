@@ -74,8 +74,6 @@ impl Pid {
     ///
     /// Costs 30 instructions on a Cortex-M4F, with limits, while the output is free (`docs/figures.md`).
     ///
-    /// Costs 118 instructions on a Cortex-M4F, with all options, while the output is free (`docs/figures.md`).
-    ///
     /// # Examples
     /// ```
     /// use drivetrain::control::{Pid, PidConfig};
