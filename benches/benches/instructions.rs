@@ -98,9 +98,9 @@ fn mecanum() {
 
 // A simulated second at 1 kHz: commands out, all feedback in.
 #[library_benchmark]
-#[bench::one(args = (1), setup = simulated, config = at_most(8_050_000))]
-#[bench::four(args = (4), setup = simulated, config = at_most(19_100_000))]
-#[bench::eight(args = (8), setup = simulated, config = at_most(32_200_000))]
+#[bench::one(args = (1), setup = simulated, config = at_most(7_150_000))]
+#[bench::four(args = (4), setup = simulated, config = at_most(17_220_000))]
+#[bench::eight(args = (8), setup = simulated, config = at_most(28_640_000))]
 fn simulator(world: Box<Simulation>) -> Box<Simulation> {
     run_second(&world);
     world

@@ -46,8 +46,12 @@ pub fn frame_bits(frame: &CanFrame) -> u32 {
         }
     }
     bits.push(u32::from(frame.length()), 4);
-    for byte in frame.data() {
-        bits.push(u32::from(*byte), 8);
+    if frame.data().len() == 8 {
+        bits.push_whole(u64::from_be_bytes(*frame.bytes()));
+    } else {
+        for byte in frame.data() {
+            bits.push(u32::from(*byte), 8);
+        }
     }
     bits.push(u32::from(bits.checksum()), 15);
     bits.count + bits.stuff_bits() + TAIL_BITS + INTERMISSION_BITS
@@ -110,10 +114,21 @@ impl Bits {
         self.count += width;
     }
 
+    fn push_whole(&mut self, data: u64) {
+        self.value = (self.value << 64) | u128::from(data);
+        self.count += 64;
+    }
+
+    /// Returns the first byte with a bit of the frame, of the 16 of a value.
+    const fn first_byte(&self) -> usize {
+        16 - self.count.div_ceil(8) as usize
+    }
+
     /// Returns the checksum. The zeros above the first bit leave it at zero.
     fn checksum(&self) -> u16 {
-        self.value.to_be_bytes().into_iter().fold(0, |checksum, byte| {
-            let [_, index] = ((checksum >> 7) ^ u16::from(byte)).to_be_bytes();
+        let bytes = self.value.to_be_bytes();
+        bytes.iter().skip(self.first_byte()).fold(0, |checksum, byte| {
+            let [_, index] = ((checksum >> 7) ^ u16::from(*byte)).to_be_bytes();
             ((checksum << 8) & 0x7FFF) ^ CHECKSUMS.get(usize::from(index)).copied().unwrap_or(0)
         })
     }
@@ -124,9 +139,8 @@ impl Bits {
     fn stuff_bits(&self) -> u32 {
         let padded = self.value | (0x55 << self.count);
         let bytes = padded.to_be_bytes();
-        let unused = bytes.len() - self.count.div_ceil(8) as usize;
         let (mut run, mut stuffed) = (Run::START, 0);
-        for byte in bytes.get(unused..).unwrap_or_default() {
+        for byte in bytes.get(self.first_byte()..).unwrap_or_default() {
             let row = STUFFED.get(usize::from(run)).unwrap_or(&[0; 256]);
             let found = row.get(usize::from(*byte)).copied().unwrap_or(0);
             stuffed += u32::from(found >> 4);

@@ -205,8 +205,10 @@ impl Engine {
     }
 
     fn next_feedback(&self) -> (u64, usize) {
-        let due = self.escs().filter_map(|(index, esc)| Some((esc.due()?, index)));
-        due.min().unwrap_or((u64::MAX, 0))
+        self.escs().fold((u64::MAX, 0), |next, (index, esc)| match esc.due() {
+            Some(due_ns) if due_ns < next.0 => (due_ns, index),
+            _ => next,
+        })
     }
 
     /// Moves motors and chassis by one step.
@@ -223,10 +225,11 @@ impl Engine {
             joint.step(STEP_S);
         }
         let ground = self.chassis.as_mut().map(|chassis| chassis.step(&self.escs, STEP_S));
+        let warms = self.steps.is_multiple_of(STEPS_A_WARMING);
         let escs = self.escs.iter_mut().take(self.esc_count).flatten();
         for (esc, ground_nm) in escs.zip(ground.unwrap_or_default()) {
             esc.rotor.step_motion(ground_nm, STEP_S);
-            if self.steps.is_multiple_of(STEPS_A_WARMING) {
+            if warms {
                 esc.rotor.step_temperature(STEP_S * STEPS_A_WARMING as f32);
             }
         }
@@ -301,7 +304,7 @@ impl Engine {
             return;
         };
         if sender == Sender::Controller {
-            for joint in self.joints.iter_mut().flatten() {
+            for joint in self.joints.iter_mut().take(self.joint_count).flatten() {
                 let reply = joint.mailboxes.candidate().filter(|_| joint.config.line == line);
                 if reply.is_some_and(|reply| reply.id() == frame.id()) {
                     joint.collisions = joint.collisions.saturating_add(1);
@@ -352,10 +355,11 @@ impl Engine {
             if sender != Sender::Controller && connected {
                 self.wire_mut(line).hear(frame);
             }
-            for esc in self.escs.iter_mut().flatten().filter(|esc| esc.config.line == line) {
+            let escs = self.escs.iter_mut().take(self.esc_count).flatten();
+            for esc in escs.filter(|esc| esc.config.line == line) {
                 esc.receive(&frame, now_ns);
             }
-            for joint in self.joints.iter_mut().flatten() {
+            for joint in self.joints.iter_mut().take(self.joint_count).flatten() {
                 if joint.config.line == line
                     && !matches!(sender, Sender::Motor(key) if key.is_joint())
                 {

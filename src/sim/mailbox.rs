@@ -24,6 +24,8 @@ struct Pending {
 pub(crate) struct Mailboxes {
     slots: [Option<Pending>; 3],
     order: u64,
+    /// The rank of the frame for the next arbitration.
+    front: Option<u32>,
 }
 
 /// Returns the rank of a frame in an arbitration, the lowest first: the fields of the wire, from the id to the remote bit.
@@ -47,7 +49,7 @@ impl Pending {
 
 impl Mailboxes {
     pub(crate) const fn new() -> Self {
-        Self { slots: [None; 3], order: 0 }
+        Self { slots: [None; 3], order: 0, front: None }
     }
 
     /// Takes a frame as `embedded_can::nb::Can::transmit` requires: frames of one id keep their order, and full
@@ -58,6 +60,7 @@ impl Mailboxes {
         if let Some(free) = self.slots.iter_mut().find(|slot| slot.is_none()) {
             *free = Some(pending);
             self.order += 1;
+            self.front = Some(self.front.map_or(rank, |front| front.min(rank)));
             return Offer::Taken;
         }
         // The last place: the lowest priority, and the youngest among equal ids.
@@ -72,6 +75,7 @@ impl Mailboxes {
                 let evicted = slot.frame;
                 *slot = pending;
                 self.order += 1;
+                self.front = self.first();
                 Offer::Replaced(evicted)
             }
             _ => Offer::Refused,
@@ -83,17 +87,21 @@ impl Mailboxes {
         self.next().map(|slot| &slot.frame)
     }
 
-    /// Returns the rank of this frame.
-    pub(crate) fn rank(&self) -> Option<u32> {
-        self.next().map(|slot| slot.rank)
+    /// Returns the rank of this frame, which each arbitration of the bus compares.
+    pub(crate) const fn rank(&self) -> Option<u32> {
+        self.front
+    }
+
+    fn first(&self) -> Option<u32> {
+        self.slots.iter().flatten().map(|slot| slot.rank).min()
     }
 
     fn next(&self) -> Option<&Pending> {
         self.slots.iter().flatten().min_by_key(|slot| slot.place())
     }
 
-    pub(crate) fn is_empty(&self) -> bool {
-        self.slots.iter().all(Option::is_none)
+    pub(crate) const fn is_empty(&self) -> bool {
+        self.front.is_none()
     }
 
     pub(crate) fn has_room(&self) -> bool {
@@ -114,6 +122,7 @@ impl Mailboxes {
                 *slot = None;
             }
         }
+        self.front = self.first();
     }
 
     /// Treats the frame in transmission as pending.
@@ -130,11 +139,13 @@ impl Mailboxes {
                 *slot = None;
             }
         }
+        self.front = self.first();
     }
 
     /// Empties all mailboxes.
     pub(crate) fn clear(&mut self) {
         self.slots = [None; 3];
+        self.front = None;
     }
 }
 

@@ -95,8 +95,8 @@ impl Rotor {
         let generated = self.generated();
         let highest = (self.supply_v - generated) / self.constants.resistance;
         let lowest = (-self.supply_v - generated) / self.constants.resistance;
-        self.current =
-            current.min(highest).max(lowest).clamp(-self.current_limit, self.current_limit);
+        let current = at_least(at_most(current, highest), lowest);
+        self.current = at_most(at_least(current, -self.current_limit), self.current_limit);
     }
 
     /// Returns the torque of the motor at the output shaft in Nm, before friction.
@@ -207,6 +207,15 @@ const fn rotor_angle(output_rad: f32, gear: f32) -> i64 {
 }
 
 /// Room temperature in °C.
+/// Returns the value or the limit, in one instruction: a current is never NaN, which `f32::min` and `f32::clamp` would check.
+const fn at_most(value: f32, upper: f32) -> f32 {
+    if value > upper { upper } else { value }
+}
+
+const fn at_least(value: f32, lower: f32) -> f32 {
+    if value < lower { lower } else { value }
+}
+
 const AMBIENT_C: f32 = 25.0;
 
 #[cfg(test)]
