@@ -334,7 +334,7 @@ impl<B, const N: usize> Bus<B, N> {
     }
 
     /// Checks the next motor in turn.
-    #[inline]
+    #[inline(always)]
     fn check_next(&mut self) {
         let index = self.motors.rounds.next;
         let Some(slot) = self.motors.slots.get_mut(usize::from(index)) else {

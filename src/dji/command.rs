@@ -51,7 +51,7 @@ impl CommandFrame {
 }
 
 /// Swaps the bytes of two words at once.
-#[inline]
+#[inline(always)]
 const fn swapped(words: [u8; 4]) -> [u8; 4] {
     u32::from_le_bytes(words).swap_bytes().rotate_left(16).to_le_bytes()
 }
@@ -72,7 +72,7 @@ pub(super) const fn to_raw(value: f32, raw_per_unit: f32, limit: i16) -> i16 {
 const WHOLE: f32 = 1.5 * 8_388_608.0;
 
 /// As [`to_raw`], for the output of a loop in every update. Half a count is rounded to the even neighbour.
-#[inline]
+#[inline(always)]
 pub(super) const fn loop_to_raw(value: f32, raw_per_unit: f32, range: Range) -> i16 {
     let sum = value * raw_per_unit + WHOLE;
     let raw = sum.to_bits().wrapping_sub(WHOLE.to_bits()).cast_signed();
@@ -102,7 +102,7 @@ const fn beyond(value: f32, raw_per_unit: f32, range: Range) -> i16 {
 }
 
 /// Limits a raw command.
-#[inline]
+#[inline(always)]
 pub(super) const fn saturate(raw: i32, range: Range) -> i16 {
     if !range.contains(raw) {
         return at_the_limit(raw, range);
@@ -269,7 +269,7 @@ impl Outbox {
         self.mark(frame.bit());
     }
 
-    #[inline]
+    #[inline(always)]
     pub(super) fn put(&mut self, place: Place, raw: i16) {
         if let Some(word) = self.words.0.as_flattened_mut().get_mut(place as usize) {
             *word = raw.to_le_bytes();
@@ -277,7 +277,7 @@ impl Outbox {
     }
 
     /// Returns the last word for a motor.
-    #[inline]
+    #[inline(always)]
     pub(super) fn get(&self, place: Place) -> i16 {
         let word = self.words.0.as_flattened().get(place as usize);
         word.map_or(0, |word| i16::from_le_bytes(*word))
@@ -307,7 +307,7 @@ impl Outbox {
     }
 
     /// Marks the frames that this update made ready.
-    #[inline]
+    #[inline(always)]
     pub(super) fn finish_update(&mut self) {
         let mut active = 0;
         for (frame, words) in CommandFrame::ALL.iter().zip(&self.words.0) {
@@ -322,7 +322,7 @@ impl Outbox {
         self.mark(due);
     }
 
-    #[inline]
+    #[inline(always)]
     fn mark(&mut self, frames: u8) {
         self.packed = self.packed.wrapping_add(ones(frames));
         if self.waiting.is_none() {

@@ -28,7 +28,7 @@ impl Feedback {
 
     /// Takes the eight bytes of a feedback frame. Returns `None` for an angle above 8191, which no motor of this family reports.
     #[must_use]
-    #[inline]
+    #[inline(always)]
     pub const fn decode(data: &[u8; 8]) -> Option<Self> {
         let [a, b, c, d, e, f, g, h] = *data;
         let feedback = Self {
@@ -40,7 +40,7 @@ impl Feedback {
 
     /// Takes a frame of 8 bytes with a possible angle and without an error code, with one comparison for all. `None` does not name the
     /// reason.
-    #[inline]
+    #[inline(always)]
     pub(super) const fn without_error(frame: &CanFrame) -> Option<Self> {
         // As one number, so each half is loaded as a word: a byte read alone would be loaded alone.
         let words = u64::from_le_bytes(*frame.bytes());
@@ -90,7 +90,7 @@ impl Feedback {
     }
 
     /// Returns bytes 7 and 6: the temperature, or a larger value if there is an error.
-    #[inline]
+    #[inline(always)]
     pub(super) const fn error_and_temperature(self) -> u32 {
         self.condition >> 16
     }

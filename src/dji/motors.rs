@@ -18,7 +18,7 @@ const COMMAND_IDS: u32 = CommandFrame::X2FF.id() as u32 - LOWEST_COMMAND_ID;
 
 /// Tells whether the id of a frame is not of this family.
 // Twice the header: the comparison then needs no mask for the bit of short frames.
-#[inline]
+#[inline(always)]
 pub(super) const fn is_of_others(frame: &CanFrame) -> bool {
     (frame.header() << 1).wrapping_sub(LOWEST_COMMAND_ID << 1) > (COMMAND_IDS << 1 | 1)
 }
@@ -117,13 +117,13 @@ impl<const N: usize> Motors<N> {
     }
 
     /// Returns the slots up to the last slot in use.
-    #[inline]
+    #[inline(always)]
     pub(super) fn taken(&self) -> &[Slot] {
         self.slots.get(..usize::from(self.used)).unwrap_or_default()
     }
 
     /// As [`taken`](Self::taken), mutable.
-    #[inline]
+    #[inline(always)]
     pub(super) fn taken_mut(&mut self) -> &mut [Slot] {
         self.slots.get_mut(..usize::from(self.used)).unwrap_or_default()
     }

@@ -160,7 +160,7 @@ impl Slot {
     }
 
     /// Returns the velocity of the output shaft.
-    #[inline]
+    #[inline(always)]
     pub(super) fn velocity(&self) -> AngularVelocity {
         AngularVelocity::from_rad_per_s(f32::from(self.feedback.rpm()) * self.rad_per_s_per_rpm)
     }
@@ -248,7 +248,7 @@ impl Slot {
 
     /// Takes a feedback frame received at `now`, shortly after the previous one. Otherwise does nothing and returns `false`. A motor that
     /// is not online, and a free slot, trust no gap.
-    #[inline]
+    #[inline(always)]
     pub(super) fn receive(&mut self, feedback: Feedback, now: u32) -> bool {
         let in_time = self.guard.is_in_time(now);
         if in_time {
@@ -295,7 +295,7 @@ impl Slot {
 
     /// Checks a motor in the usual state: online, cool, turning, no condition and no error. Returns `false` if another state is possible:
     /// the motor must then be [checked](health::check) in full. `elapsed` is the time since its last check, in units of 1.024 ms.
-    #[inline]
+    #[inline(always)]
     pub(super) fn is_well(&mut self, word: i16, elapsed: u8) -> bool {
         let (feedback, driven) = (self.feedback, i32::from(word));
         let Some(facts) = self.facts else { return true };
@@ -314,7 +314,7 @@ impl Slot {
 
     /// Runs the loops of this motor and returns its raw command. `step` is the step of `dt_s`: only the usual path uses `step`, so the step
     /// stays in registers.
-    #[inline]
+    #[inline(always)]
     pub(super) fn update(&mut self, step: &TimeStep, dt_s: f32, sent: &Outbox) -> i16 {
         let velocity = self.velocity().as_rad_per_s();
         let goal = match self.duty {

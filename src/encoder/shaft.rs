@@ -100,7 +100,7 @@ impl Shaft {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     const fn fine_per_turn(&self) -> i32 {
         self.rotor as i32 * COUNTS_PER_TURN as i32
     }
@@ -134,7 +134,7 @@ impl Shaft {
     }
 
     /// Moves by rotor counts: at most half a rotor turn (-4096 to 4096), as [`shortest`] gives.
-    #[inline]
+    #[inline(always)]
     pub const fn advance(&mut self, counts: i32) {
         let turn = self.fine_per_turn();
         let next = self.phase.wrapping_add(counts.wrapping_mul(self.fine_per_count.get() as i32));
@@ -233,7 +233,7 @@ impl Shaft {
 
     /// Returns the way to a [near](Self::near) located position, in radians: exact near zero, saturated at 63 turns.
     #[must_use]
-    #[inline]
+    #[inline(always)]
     pub(crate) const fn way_to(&self, turns: u32, phase: i32) -> f32 {
         let whole = turns.wrapping_sub(self.turns.low).cast_signed();
         let mut fine = phase.wrapping_sub(self.phase);
@@ -264,7 +264,7 @@ impl Shaft {
 
 /// Marks a way as seldom: its code stands behind the other way.
 #[cold]
-#[inline]
+#[inline(always)]
 const fn seldom() {}
 
 /// Returns 63 turns in the direction of `way`; seldom, and so out of the line of [`Shaft::way_to`].

@@ -21,7 +21,7 @@ impl ErrorPid {
     ///
     /// # Errors
     /// If the step needs more, nothing changes. The returned value is finite if `valid` and `error` are.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn plain(
         &mut self,
         (error, rate): (f32, f32),
@@ -49,12 +49,12 @@ impl ErrorPid {
         Ok(limit)
     }
 
-    #[inline]
+    #[inline(always)]
     pub(crate) const fn is_limited(&self) -> bool {
         self.parameters.output_upper < f32::MAX
     }
 
-    #[inline]
+    #[inline(always)]
     const fn keep(&mut self, output: f32, error: f32, rate: f32, integral: f32) {
         self.output = output;
         self.error = error;
@@ -65,7 +65,7 @@ impl ErrorPid {
 
 impl Pid {
     /// Tells whether the output has limits.
-    #[inline]
+    #[inline(always)]
     pub(crate) const fn is_limited(&self) -> bool {
         self.core.is_limited()
     }
@@ -132,7 +132,7 @@ impl Pid {
     ///
     /// # Errors
     /// As [`ErrorPid::plain`]. The value returned is finite if setpoint and measurement are.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn step_plain(
         &mut self,
         setpoint: f32,
@@ -303,7 +303,7 @@ impl Pid {
         (proportional, growth)
     }
 
-    #[inline]
+    #[inline(always)]
     const fn keep(&mut self, output: f32, measurement: f32, error: f32, rate: f32, integral: f32) {
         self.measurement = measurement;
         self.core.keep(output, error, rate, integral);
@@ -360,7 +360,7 @@ impl Pid {
 }
 
 /// Tells whether two numbers have the same sign.
-#[inline]
+#[inline(always)]
 const fn are_alike(one: f32, other: f32) -> bool {
     (one.to_bits() ^ other.to_bits()).cast_signed() >= 0
 }
@@ -382,18 +382,18 @@ pub(super) const fn open_gate(limit: f32) -> u32 {
 }
 
 /// Returns the limit encoded by a gate.
-#[inline]
+#[inline(always)]
 pub(super) const fn limit_of(gate: u32) -> f32 {
     f32::from_bits(gate >> 1)
 }
 
-#[inline]
+#[inline(always)]
 pub(super) const fn passes(value: f32, gate: u32) -> bool {
     magnitude(value) < gate
 }
 
 /// Sizes in an order for one integer comparison; NaN is larger than all numbers.
-#[inline]
+#[inline(always)]
 const fn magnitude(value: f32) -> u32 {
     value.to_bits() << 1
 }

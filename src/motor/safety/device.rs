@@ -100,14 +100,14 @@ impl<const N: usize> DeviceGuard<N> {
     // Time.
 
     /// Sets the time of an update and returns the time of the previous one.
-    #[inline]
+    #[inline(always)]
     pub(crate) const fn begin(&mut self, now: Instant) -> Instant {
         self.now = now.stamp();
         core::mem::replace(&mut self.updated, now)
     }
 
     /// Tells whether time moved on since `before`, and no age exceeds its limit.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn is_quiet(&self, before: Instant) -> bool {
         before < self.updated && self.updated < self.quiet_until
     }

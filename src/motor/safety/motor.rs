@@ -139,13 +139,13 @@ impl MotorGuard {
     }
 
     /// Tells whether feedback now comes within the trusted gap, for a motor that is online.
-    #[inline]
+    #[inline(always)]
     pub(crate) const fn is_in_time(&self, now: u32) -> bool {
         now.wrapping_sub(self.heard) < self.in_time >> COUNT_BITS
     }
 
     /// Notes feedback that is [in time](Self::is_in_time).
-    #[inline]
+    #[inline(always)]
     pub(crate) const fn hear_in_time(&mut self, now: u32) {
         self.heard = now;
         self.in_time = self.in_time.wrapping_add(1);
