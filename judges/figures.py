@@ -80,7 +80,7 @@ def main():
             # A share of the cases raises a figure, and lowers none.
             before = float(table[key][2]) if key in table and cases < whole else 0
             kept[key] = [str(whole), allowed, rounded_up(max(worst, before)), command]
-        order = ["motion", TESTED, "state space", "balance", "simulator", "arms"]
+        order = ["motion", TESTED, "state space", "balance", "simulator", "arms", "power"]
         lines = [f"| {' | '.join([*key, *row])} |\n" for key, row in sorted(kept.items(), key=lambda pair: order.index(pair[0][0]))]
         before, rest = text.split(BEGIN)
         PAGE.write_text(before + BEGIN + HEAD + "".join(lines) + END + rest.split(END)[1])

@@ -16,8 +16,8 @@ from figures import figure
 STEPS, WHEELS = 2_000, 4
 #: The scales of the coefficients k0, k2, k3 in the crate, and how uncertain each one is at first: they weigh the model to start from.
 SCALES, UNCERTAIN = np.array([1.0, 1.0, 1e-3]), 100.0
-#: Allowed: of the power of a wheel at 1 Nm and 30 rad/s; and of the truth, with noise of a hundredth of the power.
-SAME, TRUE = 1e-4, 0.02
+#: Allowed: of the largest of the three powers; and of each true coefficient, with noise of a hundredth of the power.
+SAME, TRUE = 1e-4, 0.05
 DEFECTS = ["wheel", "torque", "forgets", "mechanical"]
 
 
@@ -30,7 +30,7 @@ def drive(random):
     """The numbers for the program, numpy's three powers and the true ones."""
     truth = np.array([random.uniform(0.5, 3), 1, random.uniform(0.5, 4), random.uniform(0.002, 0.02)])
     start = np.array([random.uniform(0, 3), 1, random.uniform(0, 4), random.uniform(0, 0.02)]).astype("<f4").astype(float)
-    # Wheels that speed up, hold and brake: torque and speed change at different times.
+    # Torque and speed of each wheel are drawn anew every 20 steps.
     hold = lambda scale: np.repeat(random.normal(0, scale, (STEPS // 20, WHEELS)), 20, axis=0)
     torque, speed = (values.astype("<f4").astype(float) for values in (hold(1.5), hold(20.0)))
     features = np.stack([np.full(STEPS, float(WHEELS)), (torque**2).sum(axis=1), (speed**2).sum(axis=1)], axis=1)
@@ -64,6 +64,11 @@ def error(found, expected):
     return (np.abs(found - expected).max(axis=1) / expected.max(axis=1)).max()
 
 
+def coefficients(found):
+    """k0, k2 and 900 times k3."""
+    return found - np.stack([np.zeros(len(found)), found[:, 0], found[:, 0]], axis=1)
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("program")
@@ -77,20 +82,21 @@ def main():
     start = time.monotonic()
     print(f"power: {options.judge} {np.__version__}")
     random = np.random.default_rng([options.seed, 7])
-    # Each drive is some 100 kB of text for the program: a thousand is enough.
+    # Each drive is 72 kB of numbers for the program: a thousand is enough.
     drives = [drive(random) for _ in range(min(1_000, max(1, options.count)))]
     words = np.concatenate([words for words, *_ in drives])
     expected, truth = (np.array(parts) for parts in list(zip(*drives, strict=True))[1:])
     found = ours(options.program, words)
-    same, true = error(found, expected), error(found, truth)
-    require(same <= SAME and true <= TRUE, f"a fit is off by {same:.1e} of numpy's, {true:.1e} of the truth")
+    same = error(found, expected)
+    true = (np.abs(coefficients(found) - coefficients(truth)) / coefficients(truth)).max()
+    require(same <= SAME and true <= TRUE, f"a fit is off by {same:.1e} of numpy's, {true:.1e} of a true coefficient")
     name = f"numpy {np.__version__}"
-    figure("power", "losses of a wheel, fitted to a drive of 2000 steps", name, len(drives), SAME, same, "power")
-    figure("power", "losses of a wheel against the truth, noise of 1 % of the power", "the drawn model", len(drives), TRUE, true, "power")
+    figure("power", "powers of a wheel, fitted to a drive of 2000 steps, as a share of the largest", name, len(drives), SAME, same, "power")
+    figure("power", "each coefficient against the truth, noise of 1 % of the power", "the drawn model", len(drives), TRUE, true, "power")
     for defect in DEFECTS:
         require(error(ours(options.program, words, "--plant", defect), expected) > SAME, f"the defect {defect} was not found")
     print(
-        f"  power: {len(drives)} drives of {STEPS} steps: within {same:.1e} of numpy's fit, {true:.1e} of the truth\n"
+        f"  power: {len(drives)} drives of {STEPS} steps: within {same:.1e} of numpy's fit, {true:.1e} of the true coefficients\n"
         f"  found the planted defects: {', '.join(DEFECTS)}\n  {time.monotonic() - start:.0f} s"
     )
 

@@ -172,7 +172,7 @@ impl<B, const N: usize> Bus<B, N> {
 ///
 /// # Errors
 /// A target fails, and is not kept for later, if the motor is detached, not armed, relaxed by a fault or not online, or if the motor has no
-/// loop for this target. NaN or infinity also fails, and cancels the present target.
+/// loop for this target; without the loop the present target stays. NaN or infinity also fails, and cancels the present target.
 impl<B, const N: usize> Bus<B, N> {
     /// Sets a torque current.
     ///

@@ -35,7 +35,7 @@ pub(crate) const fn cube_root(x: f32) -> f32 {
     (2.0 * root + x / (root * root)) * (1.0 / 3.0)
 }
 
-/// Returns the square root of a positive `x`, to one unit in the last place, and 0 for every `x` that is not above 1.2e-38.
+/// Returns the square root of a positive `x`, to one unit in the last place, and 0 for every `x` that is not above 1.2e-38; NaN for infinity.
 ///
 /// A third of the instructions of [`sqrt`]: half of the exponent for an inverse root with an error of 3.5 % at most, two steps of
 /// Newton's rule without a division, and one for the root itself.

@@ -224,7 +224,7 @@ fn f41_a_refused_command_says_why_and_is_not_kept() {
     let mut bus = Bus::new();
     let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
     assert_eq!(bus.set_raw(wheel, 900), Err(TargetError::Disarmed));
-    assert_eq!(bus.set_velocity(wheel, rpm(1.0)), Err(TargetError::Disarmed));
+    assert_eq!(bus.set_velocity(wheel, rpm(1.0)), Err(TargetError::NoLoop));
     _ = bus.ingest(&feedback(0x201, 0, 0), at_ms(1));
     bus.arm(at_ms(1)).unwrap();
     assert_eq!(step(&mut bus, 2), Some([0; 4]), "not kept while disarmed");

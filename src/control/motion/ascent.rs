@@ -220,7 +220,7 @@ impl Ascent {
         let lowest = self.lowest(beginning, is_late, border);
         let highest = if highest > lowest { highest } else { lowest };
         let (Beginning::Up(beyond) | Beginning::Down(beyond)) = beginning;
-        // Beyond `base`, where no slope is taken off, the way bends upward by the sum at least, and grows by a quarter of its cube.
+        // Beyond `base`, where no slope is taken off, the way bends upward by `base` at least, and grows by a quarter of its cube.
         let (mut base, mut depth) = (lowest, beyond);
         if self.rise < 0.0 && self.acceleration < 0.0 {
             base = math::quick_root(-self.rise);

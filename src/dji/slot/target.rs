@@ -25,8 +25,8 @@ impl Slot {
         rad_per_s: f32,
         now: u32,
     ) -> Result<(), TargetError> {
-        self.admit(rad_per_s.is_finite())?;
         needs(self.has_speed_loop())?;
+        self.admit(rad_per_s.is_finite())?;
         self.start(Action::Velocity, Goal::of(rad_per_s.to_bits().cast_signed()), now);
         Ok(())
     }
@@ -39,8 +39,8 @@ impl Slot {
         position: Position,
         now: u32,
     ) -> Result<(), TargetError> {
-        self.admit(position.is_finite())?;
         needs(self.has_position_loop())?;
+        self.admit(position.is_finite())?;
         let (turns, phase) = self.shaft.locate(self.inside(position));
         let goal = Goal { turns: self.shaft.near(turns), value: phase };
         self.start(Action::Position, goal, now);
@@ -101,8 +101,8 @@ impl Slot {
         angle: Position,
         now: u32,
     ) -> Result<(), TargetError> {
-        self.admit(angle.is_finite())?;
         needs(self.has_position_loop())?;
+        self.admit(angle.is_finite())?;
         if !self.homing.is_known() {
             return Err(TargetError::NotHomed);
         }
@@ -121,8 +121,8 @@ impl Slot {
         now: u32,
         timeouts: &Timeouts,
     ) -> Result<(), TargetError> {
-        self.admit(way.is_finite() && rad_per_s.is_finite())?;
         needs(self.has_position_loop())?;
+        self.admit(way.is_finite() && rad_per_s.is_finite())?;
         let Some(stamp) = at.and_then(|at| MotorGuard::stamp_of_measurement(at, now, timeouts))
         else {
             if self.guard.has_target() {

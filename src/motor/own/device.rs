@@ -216,6 +216,7 @@ impl<M: OwnMotor> Own<M> {
         if stays && !may_drive {
             if self.switching.is_some() {
                 self.power.give_back();
+                self.enabling = self.enabling.saturating_sub(1);
                 self.withdraw(|own| &mut own.switching);
             }
             return;
