@@ -253,3 +253,41 @@ fn every_link_of_the_pages_leads_to_a_file_and_every_page_is_linked() {
     );
     assert_eq!(references("[a][b], [c](d)\n[b]: e.md"), (vec!["b"], vec!["b"]));
 }
+
+/// The names of a list, each before the first mark.
+fn keys<'a>(list: &'a str, mark: &str) -> Vec<&'a str> {
+    let lines = list.lines().filter_map(|line| line.split_once(mark));
+    lines.map(|(name, _)| name).filter(|name| !name.starts_with('#')).collect()
+}
+
+/// The text between two marks.
+fn part<'a>(text: &'a str, start: &str, end: &str) -> &'a str {
+    let (_, rest) = text.split_once(start).unwrap();
+    rest.split_once(end).map_or(rest, |(inside, _)| inside)
+}
+
+#[test]
+fn the_table_of_features_has_those_of_the_manifest() {
+    let (manifest, porting) = (page("Cargo.toml"), page("docs/porting.md"));
+    let declared = part(&manifest, "[features]\n", "\n[");
+    let table = part(&porting, "\n## Features\n", "\n## ");
+    let rows: Vec<Vec<&str>> =
+        table.lines().map(|line| line.split('|').map(str::trim).collect()).collect();
+    let features = |wanted: fn(&str) -> bool| {
+        let rows = rows.iter().filter(|row| row.len() > 3 && wanted(row[2]));
+        let mut found: Vec<&str> = rows.flat_map(|row| row[1].split('`')).collect();
+        found.retain(|name| {
+            name.starts_with(|c: char| c.is_ascii_lowercase()) && *name != "feature"
+        });
+        found.sort_unstable();
+        found
+    };
+    let mut expected = keys(declared, " = ");
+    expected.retain(|name| *name != "default");
+    expected.sort_unstable();
+    assert_eq!(features(|_| true), expected);
+    let default = part(declared, "default = [", "]");
+    let mut on: Vec<&str> = default.split(',').map(|name| name.trim().trim_matches('"')).collect();
+    on.sort_unstable();
+    assert_eq!(features(|mark| mark == "yes"), on);
+}

@@ -4,7 +4,7 @@ use crate::geometry::Vec3;
 /// The longest distance from the origin in m, and the largest mass in kg, of a part.
 const MOST: f32 = 1_000.0;
 
-/// A joint of a serial arm with the link that it carries, in the base frame in the zero pose.
+/// A joint of a serial arm with its link, in the base frame in the zero pose.
 ///
 /// Without [`with_mass`](Self::with_mass) the link weighs nothing.
 ///
@@ -49,7 +49,7 @@ pub(super) struct Load {
 }
 
 impl ArmJoint {
-    /// Takes a joint that turns about an axis, of any length above 1e-6, through a place in m.
+    /// Takes a rotary joint: its axis, of any length above 1e-6, and a place on the axis in m.
     ///
     /// Any place on the axis will do.
     ///
@@ -60,7 +60,7 @@ impl ArmJoint {
         Self::new(axis, JointMotion::Turns(through_m))
     }
 
-    /// Takes a joint that slides along an axis, of any length above 1e-6.
+    /// Takes a prismatic joint: its axis, of any length above 1e-6.
     ///
     /// # Errors
     /// [`ConfigError`] if a number is NaN or infinite, or the axis has no length.

@@ -8,7 +8,7 @@
 //!        | axis z                      the zero pose: all positions are 0
 //! ```
 //!
-//! An arm is data: for each joint, from the base outward, its axis and the masses that it moves, all measured in the **base frame**
+//! An arm is data: for each joint, from the base outward, its axis and the moved masses, all measured in the **base frame**
 //! in the **zero pose**. No frame of a link is needed, nor an order of rotations (the screw axes of a product of exponentials). The
 //! axes x, y, z are those of [`geometry`](crate::geometry): z points up if the base stands upright.
 //!
@@ -18,9 +18,8 @@
 //! | [`SerialArm`] | the joints, a payload and the direction of gravity; from positions to efforts |
 //!
 //! # Signs and units
-//! The position of a joint that turns is an angle in rad, positive counter-clockwise about its axis (right hand); of a joint that
-//! slides, a way in m, positive along its axis. Efforts are in Nm and N with the same signs: the effort is the one that a **motor
-//! has to exert**, so a positive effort pushes the position upward. An encoder with another zero or sense is converted by the caller.
+//! The position of a rotary joint is an angle in rad, positive counter-clockwise about its axis (right hand); of a prismatic joint,
+//! a way in m, positive along its axis. Efforts are in Nm and N with the same signs: the effort is that of the **motor**, so a positive effort pushes the position upward. An encoder with another zero or sense is converted by the caller.
 //!
 //! # Example
 //! The arm of the drawing lifts with positive angles. Level and stretched, the shoulder carries both links:

@@ -47,7 +47,7 @@ impl<const N: usize> SerialArm<N> {
 
     /// Sets the acceleration of gravity in the base frame, in m/s².
     ///
-    /// For a base that is tilted, or that hangs from a wall, this is [`UPRIGHT`](Self::UPRIGHT) behind the inverse of its attitude.
+    /// For a tilted or hanging base, this is [`UPRIGHT`](Self::UPRIGHT) behind the inverse of its attitude.
     ///
     /// # Errors
     /// [`ConfigError::NotFinite`] for NaN and infinity, and [`ConfigError::Unusable`] above 1000 m/s²; the arm then keeps the last.
@@ -92,7 +92,7 @@ impl<const N: usize> SerialArm<N> {
         Ok(())
     }
 
-    /// Returns the efforts that hold the weight of the arm at these positions: Nm of joints that turn, N of joints that slide.
+    /// Returns the efforts that hold the weight of the arm at these positions: Nm of rotary joints, N of prismatic joints.
     ///
     /// If a position is NaN or infinite, or an effort is beyond `f32`, the result is `None`: the weight of the arm is unknown then,
     /// and no number would hold it. Efforts are right to 2e-6 of the weight

@@ -396,6 +396,47 @@ fn a_driver_that_takes_no_frames_for_a_while_does_not_lose_the_mode() {
     assert_eq!((bench.drive.state(), bench.drive.modes()), (Heartbeat::CLOSED_LOOP, (1, 1)));
 }
 
+/// The frame is withdrawn by an update without a step, before the driver took it.
+#[test]
+fn an_enabling_frame_that_was_never_taken_comes_again() {
+    for taken in 0..4 {
+        let mut bench = Bench::armed(torque(), Firmware::V0_5);
+        let velocity = CanFrame::standard(0x6B, [2, 0, 0, 0, 1, 0, 0, 0]).unwrap();
+        _ = bench.drive.hear(&velocity);
+        assert_eq!(bench.drive.modes(), (2, 1));
+        let mut numbers = Vec::new();
+        for update in 0..=taken {
+            bench.own.set_torque(0.5).unwrap();
+            bench.now_us += 1_000;
+            let now = bench.now();
+            bench.own.update(Tick::new(now, 0.001));
+            while update < taken
+                && let Some(frame) = bench.own.next_frame(0)
+            {
+                numbers.push(frame.header() & 0x1F);
+                _ = bench.drive.hear(&frame);
+            }
+        }
+        bench.now_us += 1_000;
+        let now = bench.now();
+        bench.own.update(Tick::new(now, f32::NAN));
+        for _ in 0..400 {
+            bench.step();
+            _ = bench.own.set_torque(0.5);
+            if bench.drive.state() != Heartbeat::CLOSED_LOOP {
+                numbers.extend(bench.frames.iter().map(|frame| frame.header() & 0x1F));
+            } else {
+                assert_eq!(bench.drive.modes(), (1, 1), "{taken} taken: {numbers:x?}");
+            }
+        }
+        assert_eq!(bench.drive.state(), Heartbeat::CLOSED_LOOP, "{taken} taken: {numbers:x?}");
+        assert!(Devices::is_armed(&mut bench.own));
+        for number in [0x0B, 0x0F] {
+            assert!(numbers.contains(&number), "{taken} taken: no {number:#x} in {numbers:x?}");
+        }
+    }
+}
+
 #[test]
 fn frames_that_the_bus_gives_back_come_again_remote_ones_too() {
     let mut bench = Bench::new(torque(), Firmware::V0_6);

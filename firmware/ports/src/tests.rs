@@ -1,15 +1,17 @@
 //! Both drivers of the MCP2515 on a chip of 128 registers, by its data sheet (DS20001801, chapter 12).
 
 use super::{Interface, Mcp25xx, Mcp2515};
+use core::pin::pin;
+use core::task::{Context, Poll, Waker};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, M3508};
 use drivetrain::frame::CanFrame;
 use drivetrain::runner::{AbortPending, Nb, NbAbort, Runner};
-use drivetrain::time::{Duration, Instant, ManualClock};
+use drivetrain::time::{Duration, Instant, ManualClock, Tick};
 use drivetrain::units::Current;
 use embedded_can::Frame;
 use embedded_can::nb::Can;
-use embedded_can_interface::{RxFrameIo, TxFrameIo};
+use embedded_can_interface::{AsyncRxFrameIo, AsyncTxFrameIo, RxFrameIo, TxFrameIo};
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 use std::cell::RefCell;
@@ -282,4 +284,78 @@ fn an_interface_that_is_full_or_empty_would_block() {
     assert_eq!(can.transmit(&frame), Ok(None));
     assert_eq!(can.transmit(&frame), Err(nb::Error::WouldBlock));
     assert_eq!(can.receive(), Ok(frame));
+}
+
+impl AsyncTxFrameIo for Loop {
+    type Frame = CanFrame;
+    type Error = nb::Error<Infallible>;
+
+    async fn send(&mut self, frame: &CanFrame) -> Result<(), Self::Error> {
+        self.try_send(frame)
+    }
+
+    async fn send_timeout(
+        &mut self,
+        frame: &CanFrame,
+        _: core::time::Duration,
+    ) -> Result<(), Self::Error> {
+        self.try_send(frame)
+    }
+}
+
+impl AsyncRxFrameIo for Loop {
+    type Frame = CanFrame;
+    type Error = nb::Error<Infallible>;
+
+    async fn recv(&mut self) -> Result<CanFrame, Self::Error> {
+        self.try_recv()
+    }
+
+    async fn recv_timeout(&mut self, _: core::time::Duration) -> Result<CanFrame, Self::Error> {
+        self.try_recv()
+    }
+
+    async fn wait_not_empty(&mut self) -> Result<(), Self::Error> {
+        Ok(())
+    }
+}
+
+/// A tick of a program, as docs/porting.md has it.
+async fn tick<C>(
+    can: &mut C,
+    bus: &mut Bus,
+    now: Instant,
+) -> Result<(), <C as AsyncRxFrameIo>::Error>
+where
+    C: AsyncRxFrameIo<Frame = CanFrame>
+        + AsyncTxFrameIo<Frame = CanFrame, Error = <C as AsyncRxFrameIo>::Error>,
+{
+    bus.ingest(&can.recv().await?, now);
+    bus.update(Tick::new(now, 0.001));
+    if let Some(frame) = bus.next_frame() {
+        AsyncTxFrameIo::send(can, &frame).await?;
+    }
+    Ok(())
+}
+
+#[test]
+fn a_task_hears_and_drives_by_the_async_traits() {
+    let mut bus = Bus::new();
+    let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
+    let feedback = CanFrame::standard(0x201, [0; 8]).unwrap();
+    let mut can = Loop::default();
+    let mut now = Instant::from_micros(1_000);
+    for _ in 0..300 {
+        now = now + Duration::from_millis(1);
+        can.0 = Some(feedback);
+        let mut context = Context::from_waker(Waker::noop());
+        let outcome = pin!(tick(&mut can, &mut bus, now)).as_mut().poll(&mut context);
+        assert_eq!(outcome, Poll::Ready(Ok(())));
+        if !bus.is_armed() {
+            bus.arm(now).unwrap();
+        }
+        bus.set_current(wheel, Current::from_amperes(1.0)).unwrap();
+    }
+    let words = can.0.unwrap();
+    assert_eq!((words.header(), words.data()[0..2].to_vec()), (0x200, vec![0x03, 0x33])); // 819 of 16384
 }
