@@ -17,6 +17,7 @@ pub mod first_motor {}
 pub mod angle {}
 
 #[doc = "[4]: two_buses"]
+#[doc = "[5]: faults"]
 #[doc = include_str!("../docs/guide/3-chassis.md")]
 pub mod chassis {}
 
@@ -25,6 +26,7 @@ pub mod chassis {}
 pub mod two_buses {}
 
 #[doc = "[1]: first_motor"]
+#[doc = "[4]: two_buses"]
 #[doc = "[6]: pilot"]
 #[doc = include_str!("../docs/guide/5-faults.md")]
 pub mod faults {}
@@ -58,6 +60,7 @@ pub mod chinese {
     pub mod angle {}
 
     #[doc = "[4]: two_buses"]
+    #[doc = "[5]: faults"]
     #[doc = include_str!("../docs/guide/zh-CN/3-chassis.md")]
     pub mod chassis {}
 
@@ -66,6 +69,7 @@ pub mod chinese {
     pub mod two_buses {}
 
     #[doc = "[1]: first_motor"]
+    #[doc = "[4]: two_buses"]
     #[doc = "[6]: pilot"]
     #[doc = include_str!("../docs/guide/zh-CN/5-faults.md")]
     pub mod faults {}

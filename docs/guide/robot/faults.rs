@@ -50,7 +50,44 @@ fn a_silent_wheel_is_late_after_10_ms_and_lost_after_100() {
         edges.map(|edge| (edge.condition, edge.at.since(ms(1_000)).as_micros() / 1_000)).collect();
     assert_eq!(edges[..2], [(Condition::Late, 10), (Condition::Offline, 100)]);
     let speed = world.chassis().unwrap().twist.linear().norm();
-    assert!(speed < 0.02, "{speed} m/s"); // the other two stopped the robot
+    assert!(speed < 0.02, "{speed} m/s"); // the rear wheel does not turn in this motion: the front wheels brake
+}
+
+/// Loses a wheel at 0.5 m/s. Returns from then on: the time in s until 0.01 m/s, the way in m forward and to the left, the turn in
+/// degrees.
+fn stop_without(wheel: usize, wish_when_lost: Wish) -> [f64; 4] {
+    static STOP: EmergencyStop = EmergencyStop::new();
+    let world = Simulation::new(1);
+    let (wheels, _) = motors(&world);
+    world.fault(Fault::Silent(wheels[wheel]), ms(1_000)..).unwrap();
+    let mut robot = robot(&world, &STOP);
+    run(&world, &mut robot, 100, OFF);
+    run(&world, &mut robot, 900, WISH);
+    let start = world.chassis().unwrap();
+    run(&world, &mut robot, 101, WISH);
+    assert!(!robot.lower.is_armed() && robot.upper.is_armed());
+    let mut moved_s = 0.0;
+    for ms in 102..=4_000 {
+        run(&world, &mut robot, 1, wish_when_lost);
+        if world.chassis().unwrap().twist.linear().norm() > 0.01 {
+            moved_s = f64::from(ms) / 1_000.0;
+        }
+    }
+    let end = world.chassis().unwrap();
+    let turn = (end.heading_rad - start.heading_rad).to_degrees();
+    [moved_s, end.x_m - start.x_m, end.y_m - start.y_m, turn]
+}
+
+#[test]
+fn without_a_front_wheel_the_robot_turns_if_the_others_brake_and_rolls_on_if_all_are_disarmed() {
+    let is_near = |stop: [f64; 4], expected: [f64; 4]| {
+        let far = [0, 1, 2, 3].map(|i| (stop[i] - expected[i]).abs());
+        assert!(far[0] < 0.1 && far[1] < 0.01 && far[2] < 0.01 && far[3] < 1.0, "{stop:?}");
+    };
+    is_near(stop_without(2, WISH), [0.4, 0.12, 0.0, 0.0]); // rear
+    is_near(stop_without(0, WISH), [2.9, 0.33, -0.34, -55.0]); // front left
+    is_near(stop_without(1, WISH), [2.9, 0.33, 0.34, 55.0]); // front right
+    is_near(stop_without(0, OFF), [3.0, 0.79, 0.02, 2.0]);
 }
 
 #[test]
