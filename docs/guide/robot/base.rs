@@ -1,6 +1,7 @@
 use drivetrain::chassis::{Chassis, ChassisLimits, Omni};
 use drivetrain::control::PidConfig;
-use drivetrain::dji::{Bus, Config, Handle, M3508};
+use drivetrain::dji::{AttachError, Bus, Config, Handle, M3508};
+use drivetrain::error::ConfigError;
 use drivetrain::geometry::{Body, Twist};
 use drivetrain::time::Tick;
 use drivetrain::units::AngularVelocity;
@@ -15,6 +16,34 @@ const SPEED: PidConfig = PidConfig::new(3.9, 4.8, 0.0);
 #[derive(Debug)]
 pub struct Lower;
 
+/// A motor that the bus refuses, or a value that is not allowed; the text names both.
+#[derive(Debug)]
+pub enum SetupError {
+    Motor(AttachError),
+    Value(ConfigError),
+}
+
+impl From<AttachError> for SetupError {
+    fn from(error: AttachError) -> Self {
+        Self::Motor(error)
+    }
+}
+
+impl From<ConfigError> for SetupError {
+    fn from(error: ConfigError) -> Self {
+        Self::Value(error)
+    }
+}
+
+impl core::fmt::Display for SetupError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Motor(error) => error.fmt(f),
+            Self::Value(error) => error.fmt(f),
+        }
+    }
+}
+
 /// Three omni wheels: front left, front right, rear.
 #[derive(Debug)]
 pub struct Base {
@@ -24,15 +53,14 @@ pub struct Base {
 
 impl Base {
     /// Attaches the wheels with the ids 1, 2 and 3.
-    pub fn new(bus: &mut Bus<Lower>) -> Result<Self, &'static str> {
+    pub fn new(bus: &mut Bus<Lower>) -> Result<Self, SetupError> {
         let wheels = [1, 2, 3].map(|id| Config::<M3508>::new(id).speed_loop(SPEED));
-        let wheels = bus.attach_all(wheels).map_err(|_| "an id of a wheel is taken")?;
-        let layout = Omni::three(RADIUS_M, DISTANCE_M).map_err(|_| "a length is not above zero")?;
-        let mut chassis = Chassis::new(layout);
+        let wheels = bus.attach_all(wheels)?;
+        let mut chassis = Chassis::new(Omni::three(RADIUS_M, DISTANCE_M)?);
         let limits = ChassisLimits::new()
             .with_acceleration(3.0, 15.0) // m/s², rad/s²
             .with_wheel_speed(AngularVelocity::from_rpm(450.0));
-        chassis.set_limits(limits).map_err(|_| "a limit is not above zero")?;
+        chassis.set_limits(limits)?;
         Ok(Self { wheels, chassis })
     }
 

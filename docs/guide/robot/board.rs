@@ -1,3 +1,4 @@
+use crate::base::SetupError;
 use crate::pilot::Pilot;
 use crate::robot::Robot;
 use drivetrain::runner::{EmergencyStop, Nb};
@@ -24,7 +25,7 @@ pub fn program<C: Can>(
     mut clock: impl Clock + Copy,
     stop: &'static EmergencyStop,
     board: &mut impl Board,
-) -> Result<(), &'static str> {
+) -> Result<(), SetupError> {
     let mut robot = Robot::new(Nb(lower), Nb(upper), clock, stop)?;
     let mut pilot = Pilot::new()?;
     let wheels = robot.base.wheels;

@@ -3,6 +3,7 @@ use crate::robot::Wish;
 use drivetrain::chassis::{PowerBuffer, PowerModel, WheelLoad};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Handle, M3508};
+use drivetrain::error::ConfigError;
 use drivetrain::geometry::Twist;
 use drivetrain::shooter::ShooterOrder;
 use drivetrain::time::{Instant, Tick};
@@ -20,15 +21,14 @@ pub struct Pilot {
 }
 
 impl Pilot {
-    pub fn new() -> Result<Self, &'static str> {
+    pub fn new() -> Result<Self, ConfigError> {
         let spend = PidConfig::new(2.0, 0.5, 0.0).with_output_limit(120.0); // W per J
         Ok(Self {
             remote: Dbus::new(),
             referee: Referee::new(45), // W, while the referee system is silent
             // W per A and rad/s, W per A²: M3508 at 24 V
-            model: PowerModel::new(0.0, 0.475, 0.065, 0.0)
-                .map_err(|_| "a coefficient is below zero")?,
-            buffer: PowerBuffer::new(20.0, spend).map_err(|_| "the reserve is below zero")?, // J
+            model: PowerModel::new(0.0, 0.475, 0.065, 0.0)?,
+            buffer: PowerBuffer::new(20.0, spend)?, // J
         })
     }
 

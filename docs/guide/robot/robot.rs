@@ -1,4 +1,4 @@
-use crate::base::{Base, Lower};
+use crate::base::{Base, Lower, SetupError};
 use crate::switch::{Order, Switch};
 use crate::turret::{Turret, Upper};
 use drivetrain::dji::Bus;
@@ -37,7 +37,7 @@ impl<P: Port, K: Clock + Copy> Robot<P, K> {
         upper: P,
         clock: K,
         stop: &'static EmergencyStop,
-    ) -> Result<Self, &'static str> {
+    ) -> Result<Self, SetupError> {
         let (mut wheels, mut gimbal) = (Bus::branded(), Bus::branded());
         let (base, turret) = (Base::new(&mut wheels)?, Turret::new(&mut gimbal)?);
         let lower = Runner::new(lower, clock, wheels).with_emergency_stop(stop);
@@ -61,7 +61,7 @@ impl<P: Port, K: Clock + Copy> Robot<P, K> {
                 Order::Keep => {}
                 Order::Disarm => self.disarm(),
             }
-            // Armed means all wheels: when one is lost, the others stop as well.
+            // Armed means all wheels: when one is lost, the others brake.
             let twist = if self.lower.is_armed() { wish.twist } else { Twist::ZERO };
             self.base.drive(self.lower.device_mut(), twist, tick);
             self.lower.tick_limited(tick, |bus| limit(bus, tick));

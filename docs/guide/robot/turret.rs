@@ -1,3 +1,4 @@
+use crate::base::SetupError;
 use crate::yaw::yaw;
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, M2006, M3508};
@@ -27,17 +28,16 @@ pub struct Turret {
 
 impl Turret {
     /// Attaches the yaw motor, the friction wheels 1 and 2, and the loader 3.
-    pub fn new(bus: &mut Bus<Upper>) -> Result<Self, &'static str> {
-        let taken = |_| "an id of the turret is taken";
+    pub fn new(bus: &mut Bus<Upper>) -> Result<Self, SetupError> {
         let left = Config::<M3508>::new(1).speed_loop(FRICTION);
         let right = Config::<M3508>::new(2).speed_loop(FRICTION).reversed();
         let loader = Config::<M2006>::new(3).speed_loop(LOADER);
         let shooter = ShooterConfig::new(AngularVelocity::from_rpm(400.0), 8, 10.0); // 10 shots in 1 s
         Ok(Self {
-            yaw: bus.attach(yaw()).map_err(taken)?,
-            friction: bus.attach_all([left, right]).map_err(taken)?,
-            loader: bus.attach(loader).map_err(taken)?,
-            shooter: Shooter::new(shooter).map_err(|_| "the shooter does not fit")?,
+            yaw: bus.attach(yaw())?,
+            friction: bus.attach_all([left, right])?,
+            loader: bus.attach(loader)?,
+            shooter: Shooter::new(shooter)?,
         })
     }
 
@@ -70,4 +70,6 @@ fn the_motors_of_the_turret_load_their_bus_by_less_than_85_percent() {
     let mut bus = Bus::branded().with_load_ceiling(0.85);
     assert!(Turret::new(&mut bus).is_ok());
     assert_eq!(bus.motors().count(), 4);
+    let refusal = Turret::new(&mut Bus::branded().with_load_ceiling(0.5)).unwrap_err();
+    assert!(refusal.to_string().starts_with("M3508 #1: the bus load of up to 54 %"), "{refusal}");
 }
