@@ -16,6 +16,8 @@ mod pages {
     mod coming_from {}
     #[doc = include_str!("../docs/coming-from.zh-CN.md")]
     mod coming_from_chinese {}
+    #[doc = include_str!("../docs/gains.md")]
+    mod gains {}
     #[doc = include_str!("../docs/motors.md")]
     mod motors {}
     #[doc = include_str!("../docs/robot.md")]

@@ -5,7 +5,7 @@
 
 use drivetrain::chassis::{Chassis, Differential, Kinematics, Mecanum, MecanumWheels, Omni};
 use drivetrain::control::{PidConfig, WheelTuning};
-use drivetrain::dji::{Bus, Config, Handle, M3508, Model as _};
+use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, M2006, M3508, Model};
 use drivetrain::geometry::{Twist, Vec2};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{ChassisConfig, MotorConfig, Simulation, Wheel};
@@ -34,6 +34,8 @@ enum Layout {
 struct Settling {
     overshoot: f32,
     undershoot: f32,
+    /// A second after the step.
+    excess: f32,
     /// A second and a half after the step.
     error: f32,
 }
@@ -142,7 +144,8 @@ impl Robot<'_> {
         }
         let mut chassis = Chassis::new(layout);
         let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
-        let mut settling = Settling { overshoot: 0.0, undershoot: 0.0, error: f32::NAN };
+        let mut settling =
+            Settling { overshoot: 0.0, undershoot: 0.0, excess: f32::NAN, error: f32::NAN };
         let [rest, _, _] = PHASES_MS;
         let stop = rest + PHASES_MS[1];
         let mut ticks = 0;
@@ -164,8 +167,10 @@ impl Robot<'_> {
                 _ if moves => settling.overshoot = settling.overshoot.max(share - 1.0),
                 _ => settling.undershoot = settling.undershoot.max(-share),
             }
-            if ticks == rest + 1_500 {
-                settling.error = share - 1.0;
+            match ticks - rest.min(ticks) {
+                1_000 => settling.excess = share - 1.0,
+                1_500 => settling.error = share - 1.0,
+                _ => {}
             }
         }
         settling
@@ -228,6 +233,102 @@ fn with_the_gains_of_the_table_a_step_overshoots_and_runs_back_by_less_than_a_te
             layout.assert_settles(mass_kg, gains);
         }
     }
+}
+
+/// The slow pole of the rule: w/2d (d - root of d² - 1), with w = 20 rad/s and d = 2.
+#[test]
+fn the_excess_of_a_step_decays_with_a_time_constant_of_three_quarters_of_a_second() {
+    for layout in Layout::ALL {
+        for mass_kg in MASSES_KG {
+            let settling =
+                layout.step(Some(mass_kg), layout.tuning(mass_kg).speed_loop().unwrap(), 0.5);
+            let time_constant_s = 0.5 / (settling.excess / settling.error).ln();
+            let robot = format!("{layout:?}, {mass_kg} kg: {time_constant_s} s, {settling:?}");
+            assert!((time_constant_s - 0.75).abs() < 0.1, "{robot}");
+            assert!((0.002..0.02).contains(&settling.excess), "{robot}");
+        }
+    }
+}
+
+/// A step of the angle: the farthest beyond the goal in degrees, and after how many ms the shaft stays within 1 degree.
+fn turn<M: Model>(motor: MotorConfig, config: Config<M>, degrees: f32) -> (f32, u32) {
+    let world = Simulation::new(1);
+    let key = world.attach(motor).unwrap();
+    let mut bus = Bus::new();
+    let shaft = bus.attach(config).unwrap();
+    let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
+    let mut goal = None;
+    let (mut beyond, mut outside_ms) = (0.0_f32, 0);
+    for ms in 0..3_000 {
+        world.advance(Duration::from_millis(1));
+        runner.poll(16);
+        let Some(tick) = runner.due() else { continue };
+        if ms == 100 {
+            runner.arm(tick).unwrap();
+        }
+        if ms == 500 {
+            let start = runner.device().state(shaft).unwrap().position;
+            goal = Some(start + Angle::from_degrees(degrees));
+        }
+        if let Some(goal) = goal {
+            runner.device_mut().set_position(shaft, goal).unwrap();
+            let error = (world.motor(key).unwrap().position - goal).as_degrees();
+            beyond = beyond.max(error);
+            if error.abs() > 1.0 {
+                outside_ms = ms - 500;
+            }
+        }
+        runner.tick(tick);
+    }
+    (beyond, outside_ms)
+}
+
+#[test]
+fn the_gains_of_the_guide_turn_a_gimbal_and_a_loader_and_scale_with_the_inertia() {
+    let page = text("docs/gains.md");
+    let (yaw, zero) = (text("docs/guide/robot/yaw.rs"), text("docs/guide/robot/zero.rs"));
+    let has = |text: &str, parts: [&str; 2]| parts.iter().all(|part| text.contains(part));
+    assert!(has(&yaw, ["new(15.0, 0.0, 0.0).with_output_limit(4.0)", "new(1.0, 5.0, 0.0)"]));
+    assert!(has(&zero, ["new(10.0, 0.0, 0.0).with_output_limit(6.0)", "new(1.0, 10.0, 0.0)"]));
+    let gimbal_row = [
+        "15 rad/s per rad, at most 4 rad/s | 1.0 V per rad/s, 5.0 V",
+        "0.02 kg m² | 90° | 5° | 1.2 s",
+    ];
+    let loader_row = [
+        "10 rad/s per rad, at most 6 rad/s | 1.0 A per rad/s, 10.0 A",
+        "0.004 kg m² | 45° | 0.1° | 0.5 s",
+    ];
+    assert!(has(&page, gimbal_row) && has(&page, loader_row));
+
+    let gimbal = |load: f32, times: f32, most: f32| {
+        let motor = MotorConfig::gm6020_voltage(1).with_load_inertia_kg_m2(load);
+        let angle = PidConfig::new(15.0, 0.0, 0.0).with_output_limit(most);
+        let rate = PidConfig::new(times, 5.0 * times, 0.0);
+        turn(motor, Config::<Gm6020Voltage>::new(1).position_loop(angle, rate), 90.0)
+    };
+    let loader = |load: f32, times: f32| {
+        let motor = MotorConfig::m2006(1).with_load_inertia_kg_m2(load);
+        let angle = PidConfig::new(10.0, 0.0, 0.0).with_output_limit(6.0);
+        let rate = PidConfig::new(times, 10.0 * times, 0.0);
+        turn(motor, Config::<M2006>::new(1).position_loop(angle, rate), 45.0)
+    };
+    for (load, load_of_loader) in [(0.0, 0.0), (0.005, 0.002), (0.02, 0.004), (0.05, 0.05)] {
+        let times = ((load + 0.0008) / 0.0208_f32).max(1.0);
+        let (beyond, outside_ms) = gimbal(load, times, 4.0);
+        assert!(
+            beyond < 5.0 && outside_ms < 1_200,
+            "{load} kg m²: {beyond} degrees, {outside_ms} ms"
+        );
+        let times = ((load_of_loader + 0.002) / 0.006_f32).max(1.0);
+        let (beyond, outside_ms) = loader(load_of_loader, times);
+        let limit_ms = if times > 1.0 { 600 } else { 500 };
+        let shaft = format!("{load_of_loader} kg m²: {beyond} degrees, {outside_ms} ms");
+        assert!(beyond < 0.1 && outside_ms < limit_ms, "{shaft}");
+    }
+    // Without the rule, and beyond it.
+    assert!(gimbal(0.05, 1.0, 4.0).0 > 9.0 && loader(0.05, 1.0).0 > 30.0);
+    let (fast, slow) = (gimbal(0.1, 4.85, 4.0), gimbal(0.1, 4.85, 2.0));
+    assert!(fast.0 > 10.0 && slow.0 < 5.0, "{fast:?}, {slow:?}");
 }
 
 /// Also on three omni wheels, of which each carries nearly three times as much.
