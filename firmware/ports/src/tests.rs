@@ -330,7 +330,7 @@ where
     C: AsyncRxFrameIo<Frame = CanFrame>
         + AsyncTxFrameIo<Frame = CanFrame, Error = <C as AsyncRxFrameIo>::Error>,
 {
-    bus.ingest(&can.recv().await?, now);
+    _ = bus.ingest(&can.recv().await?, now);
     bus.update(Tick::new(now, 0.001));
     if let Some(frame) = bus.next_frame() {
         AsyncTxFrameIo::send(can, &frame).await?;
