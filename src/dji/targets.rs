@@ -15,7 +15,7 @@ use crate::units::{Angle, AngularVelocity, Current, Voltage};
 impl<B, const N: usize> Bus<B, N> {
     /// Returns the state of a motor; `None` before its first frame, and for a detached motor. A program pays only for the fields in use.
     ///
-    /// Costs 160 instructions on a Cortex-M4F, when every field is read (`docs/figures.md`).
+    /// Costs 142 instructions on a Cortex-M4F, when every field is read (`docs/figures.md`).
     #[must_use]
     #[inline(always)]
     pub fn state(&self, motor: impl Into<AnyHandle<B>>) -> Option<State> {
