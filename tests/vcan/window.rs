@@ -129,7 +129,9 @@ fn a_session_in_the_window_goes_from_the_start_to_a_stop() {
     sees(&["drivetrain bench  vcan0  listening, nothing is sent"]);
     sees(&["M3508 #1", "Online", "relaxed"]);
     shows("start", include_str!("screens/start.txt"));
+    std::thread::sleep(Duration::from_millis(300));
     keys(&["A"]);
+    std::thread::sleep(Duration::from_millis(300));
     sees(&["drivetrain bench  vcan0  ARMED"]);
     sees(&["M3508 #1", "Online", " still "]);
     shows("armed", include_str!("screens/armed.txt"));
@@ -147,7 +149,9 @@ fn a_session_in_the_window_goes_from_the_start_to_a_stop() {
     shows("fault", include_str!("screens/fault.txt"));
     motor.is_silent.store(false, Ordering::Relaxed);
     sees(&["drivetrain bench  vcan0  listening, nothing is sent"]);
+    std::thread::sleep(Duration::from_millis(300));
     keys(&["A"]);
+    std::thread::sleep(Duration::from_millis(300));
     sees(&["drivetrain bench  vcan0  ARMED"]);
     keys(&["S-Right"]);
     sees(&["M3508 #1", " 100.0 ", " speed "]);

@@ -90,6 +90,8 @@ impl Tuning {
         limit: f32,
         gains: (f32, f32, f32),
     ) -> Result<Self, String> {
+        // A relay that is cut off would have swung by less than its gain is reckoned with.
+        let plan = Plan { amplitude: plan.amplitude.min(limit), ..plan };
         RelayTuner::new(plan.amplitude, plan.hysteresis).map_err(|error| error.to_string())?;
         let before =
             Step { gains, rise_s: None, overshoot: 0.0, settled_s: None, steady_error: 0.0 };
@@ -145,6 +147,11 @@ impl Tuning {
                 // The relay swings about what holds the speed.
                 let bias = if efforts.1 > 0 { efforts.0 / efforts.1 as f32 } else { 0.0 };
                 let Plan { amplitude, hysteresis, .. } = self.plan;
+                let amplitude = amplitude.min(self.outcome.limit - bias.abs());
+                if amplitude <= 0.0 {
+                    let error = "its limit is used up by the speed: lower --rpm";
+                    return Next::Done(Err(error.into()));
+                }
                 match RelayTuner::new(amplitude, hysteresis).and_then(|tuner| tuner.with_bias(bias))
                 {
                     Ok(tuner) => self.stage = Stage::Swing(tuner),

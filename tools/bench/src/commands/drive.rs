@@ -65,7 +65,9 @@ impl Task for Spin {
     fn begin(&mut self, session: &mut Session) {
         if self.arm {
             for (motor, speed) in self.speeds.iter().enumerate() {
-                session.start_program(motor, Program::Speed(speed.as_rad_per_s()));
+                let top = session.robot().top_speed(motor);
+                let speed = speed.as_rad_per_s().clamp(-top, top);
+                session.start_program(motor, Program::Speed(speed));
             }
             session.arm(None);
         }

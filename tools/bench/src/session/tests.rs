@@ -2,7 +2,7 @@ use super::*;
 use crate::identifying::{Identified, Limits};
 use crate::link::Simulated;
 use crate::motors;
-use crate::options::usual;
+use crate::options::{Options, usual};
 
 /// All families, three at a time: at 1 kHz eight motors are more than a bus of 1 Mbit/s carries.
 const GROUPS: [&str; 3] = [
@@ -248,6 +248,25 @@ fn tuning_finds_gains_that_settle_faster() {
         assert_eq!(session.robot().gains(0), after.gains);
         assert!(is_at_rest(&mut session));
     }
+}
+
+#[test]
+fn a_relay_beyond_the_limit_is_reckoned_with_as_far_as_it_acts() {
+    let gain = |amplitude: Option<f32>| {
+        let mut session = session("m3508:1");
+        let outcome = measured(&mut session, |session| {
+            let options = Options { amplitude, ..usual() };
+            let plan = crate::commands::plan(session, 0, &options);
+            session.start_tuning(0, plan)
+        });
+        match outcome {
+            Ok(Outcome::Tuned(tuned)) => tuned.ultimate_gain,
+            other => panic!("{other:?}"),
+        }
+    };
+    let (usual, largest) = (gain(None), gain(Some(6.0)));
+    assert_eq!(gain(Some(100.0)), largest);
+    assert!((largest / usual - 1.0).abs() < 0.3, "{largest} and {usual}");
 }
 
 fn identified(list: &str, change: impl Fn(&mut Limits)) -> (Session, Result<Identified, String>) {

@@ -41,19 +41,29 @@ impl Ui {
         self.has_changed = true;
     }
 
-    /// Takes a key; returns what it asks for.
-    pub(crate) fn press(&mut self, key: KeyEvent, view: Option<&View>) -> Option<Action> {
+    /// Takes a key; returns what it asks for. `is_alone` tells that no other key came shortly before or waits behind.
+    pub(crate) fn press(
+        &mut self,
+        key: KeyEvent,
+        is_alone: bool,
+        view: Option<&View>,
+    ) -> Option<Action> {
         self.has_changed = true;
         self.hint = None;
         let is_control = key.modifiers.contains(KeyModifiers::CONTROL);
         // From anywhere, also while gains are typed. A terminal sends Esc and a key soon after it as Alt and this key.
         let is_alt = key.modifiers.contains(KeyModifiers::ALT);
-        if is_alt || matches!(key.code, KeyCode::Char(' ') | KeyCode::Esc) {
+        // An input method sends a space of its own.
+        let is_space = matches!(key.code, KeyCode::Char(sign) if sign.is_whitespace());
+        if is_alt || is_space || key.code == KeyCode::Esc {
             self.input = None;
             return Some(Action::Stop);
         }
         if is_control && matches!(key.code, KeyCode::Char('c' | 'z' | 'd')) {
             return Some(Action::Quit);
+        }
+        if is_control {
+            return None;
         }
         if self.input.is_some() {
             return self.type_gains(key.code);
@@ -65,6 +75,10 @@ impl Ui {
         let jog = AngularVelocity::from_rpm(factor * JOG_RPM).as_rad_per_s();
         match key.code {
             KeyCode::Char('q') => return Some(Action::Quit),
+            // Up is Esc, [ and A: torn by a slow line, or behind an Esc, it arrives as three keys. So does a pasted text.
+            KeyCode::Char('A') if !is_alone => {
+                self.hint = Some("Shift-A arms if no other key comes with it".into());
+            }
             KeyCode::Char('A') => return Some(Action::Arm),
             KeyCode::Char('a') => self.hint = Some("Shift-A arms: lift the wheels first".into()),
             KeyCode::Down | KeyCode::Tab | KeyCode::Char('j') => {
@@ -124,7 +138,7 @@ mod tests {
     use super::*;
 
     fn press(ui: &mut Ui, code: KeyCode) -> Option<Action> {
-        ui.press(KeyEvent::new(code, KeyModifiers::NONE), None)
+        ui.press(KeyEvent::new(code, KeyModifiers::NONE), true, None)
     }
 
     #[test]
@@ -135,7 +149,8 @@ mod tests {
             (Page::Help, None),
             (Page::Motors, Some("1,2,3".to_owned())),
         ] {
-            for key in [KeyCode::Char(' '), KeyCode::Esc] {
+            let spaces = [' ', '\u{3000}', '\u{a0}'].map(KeyCode::Char);
+            for key in spaces.into_iter().chain([KeyCode::Esc]) {
                 let mut ui = Ui { page, input: input.clone(), ..Ui::default() };
                 assert_eq!(press(&mut ui, key), Some(Action::Stop), "{page:?} {key}");
                 assert_eq!((ui.page, ui.input), (page, None), "{key}");
@@ -155,8 +170,20 @@ mod tests {
             (KeyCode::Char('2'), Some("0".to_owned())),
         ] {
             let mut ui = Ui { input, ..Ui::default() };
-            let action = ui.press(KeyEvent::new(code, KeyModifiers::ALT), None);
+            let action = ui.press(KeyEvent::new(code, KeyModifiers::ALT), true, None);
             assert_eq!((action, ui.input), (Some(Action::Stop), None), "{code:?}");
+        }
+    }
+
+    #[test]
+    fn a_key_among_others_does_not_arm_and_with_control_does_nothing() {
+        let mut ui = Ui::default();
+        let arm = KeyEvent::new(KeyCode::Char('A'), KeyModifiers::SHIFT);
+        assert_eq!(ui.press(arm, false, None), None);
+        assert!(ui.hint.is_some());
+        for sign in ['s', 'e', 't', 'A'] {
+            let key = KeyEvent::new(KeyCode::Char(sign), KeyModifiers::CONTROL);
+            assert_eq!(ui.press(key, true, None), None, "{sign}");
         }
     }
 
@@ -192,7 +219,7 @@ mod tests {
         assert_eq!(press(&mut ui, KeyCode::Right), Some(Action::Jog(1, rpm(10.0))));
         assert_eq!(press(&mut ui, KeyCode::Left), Some(Action::Jog(1, rpm(-10.0))));
         let shifted = KeyEvent::new(KeyCode::Right, KeyModifiers::SHIFT);
-        assert_eq!(ui.press(shifted, None), Some(Action::Jog(1, rpm(100.0))));
+        assert_eq!(ui.press(shifted, true, None), Some(Action::Jog(1, rpm(100.0))));
         assert_eq!(press(&mut ui, KeyCode::Char('0')), Some(Action::Still(1)));
     }
 
@@ -200,7 +227,7 @@ mod tests {
     fn control_c_and_control_z_quit() {
         for sign in ['c', 'z'] {
             let key = KeyEvent::new(KeyCode::Char(sign), KeyModifiers::CONTROL);
-            assert_eq!(Ui::default().press(key, None), Some(Action::Quit));
+            assert_eq!(Ui::default().press(key, true, None), Some(Action::Quit));
         }
     }
 }

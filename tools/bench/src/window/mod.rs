@@ -16,7 +16,9 @@ use crate::options::Options;
 use crate::pace::Pace;
 use keys::Ui;
 use ratatui::crossterm::cursor::Show;
-use ratatui::crossterm::event::{self, Event, KeyEventKind};
+use ratatui::crossterm::event::{
+    self, DisableBracketedPaste, EnableBracketedPaste, Event, KeyEventKind,
+};
 use ratatui::crossterm::execute;
 use ratatui::crossterm::terminal::{LeaveAlternateScreen, disable_raw_mode};
 use remote::{Action, Remote};
@@ -33,6 +35,9 @@ use view::View;
 
 /// How often keys are looked for.
 const GLANCE: Duration = Duration::from_millis(40);
+
+/// Keys within this time of each other are no key of a person's own.
+const TOGETHER: Duration = Duration::from_millis(150);
 
 /// A window gets this long to give the terminal back.
 const FAREWELL: Duration = Duration::from_secs(1);
@@ -110,7 +115,7 @@ fn farewell(window: JoinHandle<io::Result<()>>, tty: &Tty) -> Result<(), String>
 /// Gives the terminal back. `ratatui::restore` panics where standard error is gone too, and the zeros come after this.
 fn restore() {
     _ = disable_raw_mode();
-    _ = execute!(io::stdout(), Show, LeaveAlternateScreen);
+    _ = execute!(io::stdout(), DisableBracketedPaste, Show, LeaveAlternateScreen);
 }
 
 /// The session's thread.
@@ -151,7 +156,10 @@ fn show(shared: &Shared, actions: &Sender<Action>, end: &End, defects: Defects) 
             defects.push(panic.to_string());
         }
     }));
+    // A pasted text is no key then.
+    _ = execute!(io::stdout(), EnableBracketedPaste);
     let (mut ui, mut view) = (Ui::default(), None);
+    let mut alone_from = Instant::now();
     // The session stops everything if it hears nothing of the window.
     while actions.send(Action::Alive).is_ok() {
         let fresh = shared.lock().ok().and_then(|mut shared| shared.take());
@@ -170,7 +178,11 @@ fn show(shared: &Shared, actions: &Sender<Action>, end: &End, defects: Defects) 
                 continue;
             }
         };
-        match ui.press(key, view.as_ref()) {
+        let is_followed = event::poll(Duration::ZERO)?;
+        let is_alone = !is_followed && Instant::now() >= alone_from;
+        // A key that waits behind this one is not alone, however long the picture between them takes.
+        alone_from = Instant::now() + if is_followed { Duration::from_secs(1) } else { TOGETHER };
+        match ui.press(key, is_alone, view.as_ref()) {
             Some(Action::Quit) => end.ask(),
             Some(action) => _ = actions.send(action),
             None => {}
