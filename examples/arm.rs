@@ -8,6 +8,7 @@
 //! `cargo run --release --example arm [FILE.svg]`
 
 mod output;
+mod picture;
 
 use drivetrain::damiao::{Model, Motor};
 use drivetrain::error::ConfigError;
@@ -19,7 +20,7 @@ use drivetrain::sim::{DamiaoDrive, DriveShaft, Line, Simulation};
 use drivetrain::time::Duration;
 use drivetrain::units::Angle;
 use output::console;
-use plotters::prelude::*;
+use picture::{BLUE, GREY, RED};
 use std::error::Error;
 
 const GRAVITY: f32 = 9.81;
@@ -215,38 +216,29 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 fn plot(path: &str, samples: &[Sample]) -> Result<(), Box<dyn Error>> {
-    const COLORS: [RGBColor; 3] =
-        [RGBColor(140, 140, 140), RGBColor(200, 60, 40), RGBColor(30, 80, 180)];
-    let root = SVGBackend::new(path, (900, 600)).into_drawing_area();
-    root.fill(&WHITE)?;
-    let (above, below) = root.split_vertically(300);
-    type Values = fn(&Sample) -> [f32; 3];
-    let charts: [(_, &str, f32, f32, Values); 2] = [
+    let charts: [picture::Chart<'_, Sample>; 2] = [
         (
-            above,
-            "angles in degrees (grey: base, red: shoulder, blue: elbow)",
+            "angles (grey: base, red: shoulder, blue: elbow)",
+            "degrees",
             -10.0,
             80.0,
-            |sample| sample.angles_deg,
+            &[
+                (GREY, |sample| sample.angles_deg[0]),
+                (RED, |sample| sample.angles_deg[1]),
+                (BLUE, |sample| sample.angles_deg[2]),
+            ],
         ),
-        (below, "torques in Nm", -4.0, 4.0, |sample| sample.torques_nm),
+        (
+            "torques (grey: base, red: shoulder, blue: elbow)",
+            "Nm",
+            -4.0,
+            4.0,
+            &[
+                (GREY, |sample| sample.torques_nm[0]),
+                (RED, |sample| sample.torques_nm[1]),
+                (BLUE, |sample| sample.torques_nm[2]),
+            ],
+        ),
     ];
-    for (area, caption, lowest, highest, values) in charts {
-        let mut chart = ChartBuilder::on(&area)
-            .caption(caption, ("sans-serif", 16))
-            .margin(8)
-            .x_label_area_size(20)
-            .y_label_area_size(52)
-            .build_cartesian_2d(0.0..END as f32 * 1e-3, lowest..highest)?;
-        chart.configure_mesh().light_line_style(TRANSPARENT).draw()?;
-        for (index, color) in COLORS.iter().enumerate() {
-            let points = samples
-                .iter()
-                .step_by(4)
-                .filter_map(|sample| Some((sample.time_s, *values(sample).get(index)?)));
-            chart.draw_series(LineSeries::new(points, *color))?;
-        }
-    }
-    root.present()?;
-    Ok(())
+    picture::draw(path, samples, |sample| sample.time_s, &charts)
 }

@@ -8,12 +8,14 @@
 //! controller knows, and 2 ms late. Prints the largest tilt and the state at the end; fails if the body tilts by more than 15 degrees, or the robot
 //! is not at rest at its length in the end. In space, with contacts and with frames of motors, `judges/balance.py` judges the same controller.
 
+mod output;
 mod picture;
 
 use drivetrain::chassis::{BalanceModel, BalancePhase, Balancer, FiveBar, LegEffort};
 use drivetrain::geometry::{Attitude, Rotation3};
 use drivetrain::units::{Angle, AngularVelocity};
-use picture::{BLUE, GREY, RED, console, output};
+use output::console;
+use picture::{BLUE, GREY, RED};
 use std::collections::VecDeque;
 use std::error::Error;
 
@@ -219,7 +221,8 @@ fn judge(samples: &[Sample]) -> Result<(), Box<dyn Error>> {
 fn plot(path: &str, samples: &[Sample]) -> Result<(), Box<dyn Error>> {
     let charts: [picture::Chart<'_, Sample>; 4] = [
         (
-            "pitch of the body (blue) and lean of the legs (red), degrees",
+            "blue: pitch of the body, red: lean of the legs",
+            "degrees",
             -15.0,
             15.0,
             &[
@@ -228,13 +231,14 @@ fn plot(path: &str, samples: &[Sample]) -> Result<(), Box<dyn Error>> {
             ],
         ),
         (
-            "velocity, m/s (grey: target)",
+            "velocity (grey: target, blue: measured)",
+            "m/s",
             -1.5,
             1.5,
             &[(GREY, |sample| sample.target), (BLUE, |sample| sample.rate[0])],
         ),
-        ("length of the legs, m", 0.1, 0.4, &[(BLUE, |sample| sample.place[2])]),
-        ("torque of both wheels, Nm", -10.0, 10.0, &[(BLUE, |sample| sample.wheel_nm)]),
+        ("length of the legs", "m", 0.1, 0.4, &[(BLUE, |sample| sample.place[2])]),
+        ("torque of both wheels", "Nm", -10.0, 10.0, &[(BLUE, |sample| sample.wheel_nm)]),
     ];
     picture::draw(path, samples, |sample| sample.time_s, &charts)
 }

@@ -11,6 +11,7 @@
 
 mod arguments;
 mod console;
+mod picture;
 
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Voltage};
@@ -21,7 +22,7 @@ use drivetrain::sim::{Line, MotorConfig, MotorKey, Simulation};
 use drivetrain::time::{Duration, Instant};
 use drivetrain::units::{Angle, AngularVelocity};
 use lexopt::Arg::{Long, Short, Value};
-use plotters::prelude::*;
+use picture::{BLUE, GREY, RED};
 use std::error::Error;
 use std::f32::consts::TAU;
 
@@ -248,44 +249,16 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 fn plot(path: &str, samples: &[Sample]) -> Result<(), Box<dyn Error>> {
-    const BLUE: RGBColor = RGBColor(30, 80, 180);
-    const RED: RGBColor = RGBColor(200, 60, 40);
-    const GREY: RGBColor = RGBColor(140, 140, 140);
-    let root = SVGBackend::new(path, (900, 700)).into_drawing_area();
-    root.fill(&WHITE)?;
-    let (above, rest) = root.split_vertically(300);
-    let (middle, below) = rest.split_vertically(200);
-    type Line<'a> = (&'a RGBColor, fn(&Sample) -> f32);
-    let charts: [(_, &str, f32, f32, &[Line<'_>]); 3] = [
+    let charts: [picture::Chart<'_, Sample>; 3] = [
         (
-            above,
-            "yaw in the world, degrees (red: gimbal, grey: chassis)",
+            "yaw in the world (red: gimbal, grey: chassis)",
+            "degrees",
             -100.0,
-            700.0,
-            &[(&GREY, |sample| sample.chassis_deg), (&RED, |sample| sample.yaw_deg)],
+            1_100.0,
+            &[(GREY, |sample| sample.chassis_deg), (RED, |sample| sample.yaw_deg)],
         ),
-        (
-            middle,
-            "error, degrees",
-            -2.0,
-            2.0,
-            &[(&BLUE, |sample| sample.error_deg.clamp(-2.0, 2.0))],
-        ),
-        (below, "command, raw", -25_000.0, 25_000.0, &[(&BLUE, |sample| sample.raw as f32)]),
+        ("error", "degrees", -2.0, 2.0, &[(BLUE, |sample| sample.error_deg)]),
+        ("command", "raw", -25_000.0, 25_000.0, &[(BLUE, |sample| sample.raw as f32)]),
     ];
-    for (area, caption, lowest, highest, lines) in charts {
-        let mut chart = ChartBuilder::on(&area)
-            .caption(caption, ("sans-serif", 16))
-            .margin(8)
-            .x_label_area_size(20)
-            .y_label_area_size(52)
-            .build_cartesian_2d(0.0..END_S, lowest..highest)?;
-        chart.configure_mesh().light_line_style(TRANSPARENT).draw()?;
-        for (color, value) in lines {
-            let points = samples.iter().step_by(4).map(|sample| (sample.time_s, value(sample)));
-            chart.draw_series(LineSeries::new(points, *color))?;
-        }
-    }
-    root.present()?;
-    Ok(())
+    picture::draw(path, samples, |sample| sample.time_s, &charts)
 }

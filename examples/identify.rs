@@ -9,6 +9,7 @@
 //! step with guessed gains and with these. Fails when inertia or friction is off by 5 %, or the step is not the better one.
 //! On a real robot, lift the wheels off the ground first, and choose limits that the mechanism can take.
 
+mod output;
 mod picture;
 
 use drivetrain::control::{Excitation, Identification, PidConfig, Plant};
@@ -17,7 +18,8 @@ use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{MotorConfig, Simulation};
 use drivetrain::time::Duration;
 use drivetrain::units::{Angle, AngularVelocity, Current};
-use picture::{BLUE, GREY, RED, console, output};
+use output::console;
+use picture::{BLUE, GREY, RED};
 use std::error::Error;
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
@@ -169,13 +171,15 @@ fn report(plant: &Plant) {
 fn plot(path: &str, samples: &[Sample]) -> Outcome<()> {
     let charts: [picture::Chart<'_, Sample>; 2] = [
         (
-            "the run: speed, rad/s (blue), and effort, A (red)",
+            "the run (blue: speed, red: effort)",
+            "rad/s, A",
             -SPEED,
             SPEED,
             &[(RED, |sample| sample.effort), (BLUE, |sample| sample.speed)],
         ),
         (
-            "a step of the speed, rad/s (grey: target, red: guessed gains, blue: identified)",
+            "a step of the speed (grey: target, red: guessed gains, blue: identified)",
+            "rad/s",
             0.0,
             1.6 * TARGET,
             &[(GREY, |_| TARGET), (RED, |sample| sample.guessed), (BLUE, |sample| sample.tuned)],

@@ -7,6 +7,7 @@
 //! `cargo run --release --example motion [FILE.svg]`
 
 mod output;
+mod picture;
 
 use drivetrain::control::{MotionFollower, MotionLimits, MotionTarget, Motions, ProfileState};
 use drivetrain::damiao::{Model, Motor};
@@ -17,7 +18,7 @@ use drivetrain::sim::{DamiaoDrive, DriveShaft, Line, Simulation};
 use drivetrain::time::Duration;
 use drivetrain::units::{Angle, AngularVelocity};
 use output::console;
-use plotters::prelude::*;
+use picture::{BLUE, GREY, RED};
 use std::error::Error;
 
 const MODEL: Model = Model::J4310;
@@ -183,18 +184,11 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 fn plot(path: &str, samples: &[Sample]) -> Result<(), Box<dyn Error>> {
-    const GREY: RGBColor = RGBColor(140, 140, 140);
-    const RED: RGBColor = RGBColor(200, 60, 40);
-    const BLUE: RGBColor = RGBColor(30, 80, 180);
-    let root = SVGBackend::new(path, (900, 800)).into_drawing_area();
-    root.fill(&WHITE)?;
-    let areas = root.split_evenly((3, 1));
-    type Values = fn(&Sample) -> f32;
-    /// Name, upper end of the axis, and the curves of a chart.
-    type Chart<'a> = (&'a str, f32, &'a [(RGBColor, Values)]);
-    let charts: [Chart<'_>; 3] = [
+    let charts: [picture::Chart<'_, Sample>; 3] = [
         (
-            "angle in rad (grey: target, red: plan, blue: joint)",
+            "angle (grey: target, red: plan, blue: joint)",
+            "rad",
+            -3.0,
             3.0,
             &[
                 (GREY, |sample| sample.target),
@@ -202,26 +196,14 @@ fn plot(path: &str, samples: &[Sample]) -> Result<(), Box<dyn Error>> {
                 (BLUE, |sample| sample.angle),
             ],
         ),
-        ("velocity of the plan in rad/s", 8.0, &[(RED, |sample| sample.planned.velocity)]),
+        ("velocity of the plan", "rad/s", -8.0, 8.0, &[(RED, |sample| sample.planned.velocity)]),
         (
-            "acceleration of the plan in rad/s²",
+            "acceleration of the plan",
+            "rad/s²",
+            -80.0,
             80.0,
             &[(RED, |sample| sample.planned.acceleration)],
         ),
     ];
-    for (area, (caption, most, lines)) in areas.iter().zip(charts) {
-        let mut chart = ChartBuilder::on(area)
-            .caption(caption, ("sans-serif", 16))
-            .margin(8)
-            .x_label_area_size(20)
-            .y_label_area_size(52)
-            .build_cartesian_2d(0.0..END as f32 * DT_S, -most..most)?;
-        chart.configure_mesh().light_line_style(TRANSPARENT).draw()?;
-        for (color, value) in lines {
-            let points = samples.iter().step_by(4).map(|sample| (sample.time_s, value(sample)));
-            chart.draw_series(LineSeries::new(points, *color))?;
-        }
-    }
-    root.present()?;
-    Ok(())
+    picture::draw(path, samples, |sample| sample.time_s, &charts)
 }

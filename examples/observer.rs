@@ -7,6 +7,7 @@
 //! The feedback of the motor has noise. Prints how soon each load is told and how much noise is left in the speed; fails when a
 //! load is told late or the speed has more than half of the noise.
 
+mod output;
 mod picture;
 
 use drivetrain::control::{LoadObserver, PidConfig};
@@ -15,7 +16,8 @@ use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{Fault, MotorConfig, MotorKey, Simulation};
 use drivetrain::time::{Duration, Instant};
 use drivetrain::units::AngularVelocity;
-use picture::{BLUE, GREY, RED, console, output};
+use output::console;
+use picture::{BLUE, GREY, RED};
 use std::error::Error;
 
 /// A per rad/s and A per rad.
@@ -129,13 +131,15 @@ fn judge(samples: &[Sample]) -> Result<(), Box<dyn Error>> {
 fn plot(path: &str, samples: &[Sample]) -> Result<(), Box<dyn Error>> {
     let charts: [picture::Chart<'_, Sample>; 2] = [
         (
-            "speed, rad/s (grey: feedback, blue: observer)",
+            "speed (grey: feedback, blue: observer)",
+            "rad/s",
             8.0,
             11.0,
             &[(GREY, |sample| sample.measured), (BLUE, |sample| sample.observed)],
         ),
         (
-            "torque, Nm (grey: of the motor, red: load that the observer tells)",
+            "torque (grey: of the motor, red: load that the observer tells)",
+            "Nm",
             -6.0,
             6.0,
             &[(GREY, |sample| sample.torque_nm), (RED, |sample| sample.load_nm)],

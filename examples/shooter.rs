@@ -7,6 +7,7 @@
 //! The heat of the barrel comes as frames of the referee system, ten times a second. Fails when a ball leaves at another speed than that
 //! of the wheels within 1 %, when the count is wrong, or when the true heat exceeds the limit.
 
+mod output;
 mod picture;
 
 use drivetrain::control::PidConfig;
@@ -20,7 +21,8 @@ use drivetrain::sim::{Fault, MotorConfig, MotorKey, Simulation};
 use drivetrain::time::{Duration, Instant};
 use drivetrain::units::AngularVelocity;
 use drivetrain::wire::referee::{Referee, encode};
-use picture::{BLUE, GREY, RED, console, output};
+use output::console;
+use picture::{BLUE, GREY, RED};
 use std::error::Error;
 
 const WHEELS: AngularVelocity = AngularVelocity::from_rpm(400.0);
@@ -227,15 +229,16 @@ fn main() -> Result<(), Box<dyn Error>> {
     console::line(format_args!("heat         {hottest:.0} at most, the limit is {HEAT_LIMIT}"));
 
     let charts: [picture::Chart<'_, Sample>; 4] = [
-        ("friction wheels, rpm", 0.0, 450.0, &[(BLUE, |sample| sample.wheel_rpm)]),
-        ("loader, rpm", -100.0, 150.0, &[(BLUE, |sample| sample.loader_rpm)]),
+        ("friction wheels", "rpm", 0.0, 450.0, &[(BLUE, |sample| sample.wheel_rpm)]),
+        ("loader", "rpm", -100.0, 150.0, &[(BLUE, |sample| sample.loader_rpm)]),
         (
-            "heat (red: true, grey: as the shooter reckons)",
+            "heat of the barrel (red: true, grey: as the shooter reckons)",
+            "heat",
             0.0,
             160.0,
             &[(GREY, |sample| sample.believed), (RED, |sample| sample.heat)],
         ),
-        ("shots", 0.0, 40.0, &[(BLUE, |sample| sample.shots)]),
+        ("shots", "count", 0.0, 40.0, &[(BLUE, |sample| sample.shots)]),
     ];
     picture::draw(&path, &samples, |sample| sample.time_s, &charts)?;
     console::line(format_args!("{path}"));

@@ -8,12 +8,14 @@
 //! the cart and the angle of the pendulum) at 200 Hz, and limits its force. Prints the largest angle and the error at the end; fails if the
 //! pendulum leans by more than 0.35 rad or the cart is not within 2 cm of its target at the end.
 
+mod output;
 mod picture;
 
 use drivetrain::control::state_space::{
     KalmanFilter, LinearQuadraticRegulator, LinearSystem, bryson, diagonal,
 };
-use picture::{BLUE, GREY, RED, console, output};
+use output::console;
+use picture::{BLUE, GREY, RED};
 use std::error::Error;
 
 /// kg, kg, m, m/s².
@@ -126,18 +128,20 @@ fn judge(samples: &[Sample]) -> Result<(), Box<dyn Error>> {
 fn plot(path: &str, samples: &[Sample]) -> Result<(), Box<dyn Error>> {
     let charts: [picture::Chart<'_, Sample>; 3] = [
         (
-            "cart, m (grey: target, blue: truth)",
+            "cart (grey: target, blue: truth)",
+            "m",
             -0.5,
             1.5,
             &[(GREY, |it| it.target), (BLUE, |it| it.truth[0])],
         ),
         (
-            "rate of the pendulum, rad/s (grey: truth, red: estimate)",
+            "rate of the pendulum (grey: truth, red: estimate)",
+            "rad/s",
             -2.0,
             2.0,
             &[(GREY, |it| it.truth[3]), (RED, |it| it.estimate[3])],
         ),
-        ("force, N", -LIMIT, LIMIT, &[(BLUE, |it| it.force)]),
+        ("force", "N", -LIMIT, LIMIT, &[(BLUE, |it| it.force)]),
     ];
     picture::draw(path, samples, |sample| sample.time_s, &charts)
 }

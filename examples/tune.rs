@@ -7,8 +7,11 @@
 //! On a real robot the three steps are the same; lift the wheels off the ground first. The motors here are simulated, and some
 //! of their inertia and friction is an estimate: take the procedure home, not the gains.
 
+#[path = "picture/axes.rs"]
+mod axes;
 mod output;
 
+use axes::{BLUE, RED};
 use drivetrain::control::{PidConfig, RelayTuner, StepResponse, TuningRule};
 use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, M3508, Model};
 use drivetrain::runner::{Nb, Runner};
@@ -164,19 +167,10 @@ fn plot(path: &str, motors: &[Tuned]) -> Outcome<()> {
     let root = SVGBackend::new(path, (900, 640)).into_drawing_area();
     root.fill(&WHITE)?;
     for (area, motor) in root.split_evenly((motors.len(), 1)).iter().zip(motors) {
-        let title = format!("{} (grey: target, red: guessed, blue: tuned)", motor.name);
-        let mut chart = ChartBuilder::on(area)
-            .caption(title, ("sans-serif", 16))
-            .margin(8)
-            .x_label_area_size(44)
-            .y_label_area_size(52)
-            .build_cartesian_2d(0.0_f32..0.6, 0.0..1.6 * motor.target)?;
-        chart
-            .configure_mesh()
-            .light_line_style(TRANSPARENT)
-            .x_desc("time since the step, s")
-            .y_desc("speed, rad/s")
-            .draw()?;
+        let title = format!("step of the {} (grey: target, red: guessed, blue: tuned)", motor.name);
+        let time = (axes::TIME, 0.0..0.6);
+        let speed = ("rad/s", 0.0..1.6 * motor.target);
+        let mut chart = axes::axes(area, &title, time, speed, None)?;
         let target = [(0.0, motor.target), (0.6, motor.target)];
         chart.draw_series(LineSeries::new(target, &RGBColor(150, 150, 150)))?;
         for (curve, colour) in [(&motor.before, RED), (&motor.after, BLUE)] {

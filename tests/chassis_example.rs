@@ -179,7 +179,7 @@ fn picture_and_rows_of_a_bus_off_have_the_currents() {
     let (picture, rows) = (file("bus-off.svg"), file("bus-off.csv"));
     plot::write(&picture, &run).unwrap();
     let picture = std::fs::read_to_string(picture).unwrap();
-    assert!(picture.contains("current of the ESCs, A (shaded: no command reaches them)"));
+    assert!(picture.contains("current of the ESCs (shaded: no command reaches them)"));
     // Only these lines have the last two colours. 301 of 700 points of each stand at one height.
     for color in ["#288C3C", "#965AAA"] {
         let lines = picture.split("<polyline").filter(|line| line.contains(color));

@@ -9,12 +9,15 @@
 //! burst does not bring more power.
 
 mod drive;
+#[path = "../output/mod.rs"]
+mod output;
 #[path = "../picture/mod.rs"]
 mod picture;
 mod supply;
 
 use drive::{BUFFER_RESERVE_J, BURST_S, BURST_W, Lost, RESERVE_J, Sample, least, mean};
-use picture::{BLUE, GREY, RED, console, output};
+use output::console;
+use picture::{BLUE, GREY, RED};
 use std::error::Error;
 use supply::{CAPACITOR_J, LIMIT_W};
 
@@ -54,9 +57,10 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 fn plot(path: &str, samples: &[Sample]) -> Result<(), Box<dyn Error>> {
     let charts: [picture::Chart<'_, Sample>; 4] = [
-        ("speed, m/s", 0.0, 3.0, &[(BLUE, |sample| sample.speed_m_s)]),
+        ("speed", "m/s", 0.0, 3.0, &[(BLUE, |sample| sample.speed_m_s)]),
         (
-            "power, W (grey: allowed, blue: chassis, red: from the supply)",
+            "power (grey: allowed, blue: chassis, red: from the supply)",
+            "W",
             -100.0,
             260.0,
             &[
@@ -66,13 +70,15 @@ fn plot(path: &str, samples: &[Sample]) -> Result<(), Box<dyn Error>> {
             ],
         ),
         (
-            "buffer of the referee system, J (grey: reserve)",
+            "buffer of the referee system (red: charge, grey: reserve)",
+            "J",
             0.0,
             65.0,
             &[(GREY, |_| BUFFER_RESERVE_J), (RED, |sample| sample.buffer_j)],
         ),
         (
-            "capacitor, J (grey: reserve)",
+            "capacitor (red: charge, grey: reserve)",
+            "J",
             0.0,
             CAPACITOR_J,
             &[(GREY, |_| RESERVE_J), (RED, |sample| sample.capacitor_j)],

@@ -1,21 +1,20 @@
 //! Targets and speeds of the wheels, the path, and the currents of the ESCs, as one picture.
 
+#[path = "../picture/axes.rs"]
+pub(crate) mod axes;
+
 use super::report::NAMES;
 use super::scenario::{Run, Sample};
+use axes::{Area, BLUE, RED, TIME, axes};
 use plotters::prelude::*;
 use std::error::Error;
 use std::path::Path;
 
-const TITLES: [&str; 4] =
-    ["front left, rpm", "front right, rpm", "rear left, rpm", "rear right, rpm"];
+const TITLES: [&str; 4] = ["front left", "front right", "rear left", "rear right"];
 /// Makes the map as high as it is wide, so that a square looks like one.
 const MAP_HEIGHT: i32 = 440;
-pub(crate) const TARGET: RGBColor = RGBColor(200, 60, 40);
-pub(crate) const MEASURED: RGBColor = RGBColor(30, 80, 180);
 /// Of the wheels, in the order of [`TITLES`].
-pub(crate) const COLORS: [RGBColor; 4] =
-    [TARGET, MEASURED, RGBColor(40, 140, 60), RGBColor(150, 90, 170)];
-const FAULT: RGBColor = RGBColor(245, 225, 160);
+pub(crate) const COLORS: [RGBColor; 4] = [RED, BLUE, RGBColor(40, 140, 60), RGBColor(150, 90, 170)];
 /// Samples of 1 ms between two points of a line: with fewer the picture is several times as large.
 const STEP: usize = 25;
 
@@ -32,8 +31,8 @@ pub(crate) fn write(path: &Path, run: &Run) -> Result<(), Box<dyn Error>> {
     let (map, currents) = map.split_vertically(MAP_HEIGHT);
     let line = |place: fn(&Sample) -> (f32, f32)| run.samples.iter().map(place).collect::<Vec<_>>();
     let (planned, driven) = (line(|sample| sample.planned_m), line(|sample| sample.position_m));
-    let title = "path, m (red: planned, blue: driven)";
-    draw_map(&map, title, &[(TARGET, &planned), (MEASURED, &driven)])?;
+    let title = "path (red: planned, blue: driven)";
+    draw_map(&map, title, &[(RED, &planned), (BLUE, &driven)])?;
     draw_currents(&currents, &Currents::of(run))?;
     root.present()?;
     Ok(())
@@ -55,12 +54,12 @@ impl Currents {
         let end_s = run.samples.last().map_or(1.0, |sample| sample.time_s);
         let (title, from_s, until_s, step) = match &run.silence {
             Some(silence) => (
-                "current of the ESCs, A (shaded: no command reaches them)",
+                "current of the ESCs (shaded: no command reaches them)",
                 (silence.from_s - MARGIN_S).max(0.0),
                 (silence.until_s + MARGIN_S).min(end_s),
                 1,
             ),
-            None => ("current of the ESCs, A", 0.0, end_s, STEP),
+            None => ("current of the ESCs", 0.0, end_s, STEP),
         };
         let within = || {
             let samples = run.samples.iter();
@@ -80,17 +79,8 @@ impl Currents {
 fn draw_currents(area: &Area<'_>, currents: &Currents) -> Result<(), Box<dyn Error>> {
     let values = currents.lines.iter().flatten();
     let reach = values.fold(1.0_f32, |reach, (_, amperes)| reach.max(amperes.abs())) * 1.1;
-    let mut chart = ChartBuilder::on(area)
-        .caption(currents.title, ("sans-serif", 16))
-        .margin(10)
-        .x_label_area_size(24)
-        .y_label_area_size(46)
-        .build_cartesian_2d(currents.from_s..currents.until_s, -reach..reach)?;
-    if let Some((from_s, until_s)) = currents.shaded_s {
-        let shade = Rectangle::new([(from_s, -reach), (until_s, reach)], FAULT.filled());
-        chart.draw_series(std::iter::once(shade))?;
-    }
-    chart.configure_mesh().light_line_style(TRANSPARENT).x_labels(6).draw()?;
+    let time = (TIME, currents.from_s..currents.until_s);
+    let mut chart = axes(area, currents.title, time, ("A", -reach..reach), currents.shaded_s)?;
     for ((line, color), name) in currents.lines.iter().zip(COLORS).zip(NAMES) {
         chart
             .draw_series(LineSeries::new(line.iter().copied(), color))?
@@ -105,8 +95,6 @@ fn draw_currents(area: &Area<'_>, currents: &Currents) -> Result<(), Box<dyn Err
     Ok(())
 }
 
-pub(crate) type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
-
 fn draw_wheel(area: &Area<'_>, run: &Run, wheel: usize, title: &str) -> Result<(), Box<dyn Error>> {
     let end = run.samples.last().map_or(1.0, |sample| sample.time_s);
     let rpm = |values: [f32; 4]| values.get(wheel).copied().unwrap_or(0.0);
@@ -116,19 +104,12 @@ fn draw_wheel(area: &Area<'_>, run: &Run, wheel: usize, title: &str) -> Result<(
         || run.samples.iter().map(|sample| (sample.time_s, rpm(sample.measured_rpm.into_array())));
     let reach =
         targets().chain(measured()).fold(10.0_f32, |reach, (_, rpm)| reach.max(rpm.abs())) * 1.1;
-    let mut chart = ChartBuilder::on(area)
-        .caption(title, ("sans-serif", 16))
-        .margin(6)
-        .x_label_area_size(24)
-        .y_label_area_size(46)
-        .build_cartesian_2d(0.0..end, -reach..reach)?;
-    if let Some((_, from, until)) = run.trouble {
-        let shade = Rectangle::new([(from, -reach), (until.min(end), reach)], FAULT.filled());
-        chart.draw_series(std::iter::once(shade))?;
-    }
-    chart.configure_mesh().light_line_style(TRANSPARENT).x_labels(11).y_labels(5).draw()?;
-    chart.draw_series(LineSeries::new(targets().step_by(STEP), &TARGET))?;
-    chart.draw_series(LineSeries::new(measured().step_by(STEP), &MEASURED))?;
+    let shade = if run.trouble.is_some() { ", shaded: fault" } else { "" };
+    let title = format!("{title} (red: target, blue: measured{shade})");
+    let shaded = run.trouble.map(|(_, from, until)| (from, until));
+    let mut chart = axes(area, &title, (TIME, 0.0..end), ("rpm", -reach..reach), shaded)?;
+    chart.draw_series(LineSeries::new(targets().step_by(STEP), &RED))?;
+    chart.draw_series(LineSeries::new(measured().step_by(STEP), &BLUE))?;
     Ok(())
 }
 
@@ -142,13 +123,7 @@ pub(crate) fn draw_map(
         low = low.min(x - 0.2).min(y - 0.2);
         high = high.max(x + 0.2).max(y + 0.2);
     }
-    let mut chart = ChartBuilder::on(area)
-        .caption(title, ("sans-serif", 16))
-        .margin(10)
-        .x_label_area_size(24)
-        .y_label_area_size(46)
-        .build_cartesian_2d(low..high, low..high)?;
-    chart.configure_mesh().light_line_style(TRANSPARENT).draw()?;
+    let mut chart = axes(area, title, ("x, m", low..high), ("y, m", low..high), None)?;
     for (color, line) in lines {
         chart.draw_series(LineSeries::new(line.iter().step_by(STEP).copied(), color))?;
     }
