@@ -87,6 +87,7 @@ fn drive(world: &Simulation) -> Result<Vec<Sample<3>>, Box<dyn Error>> {
             believed_m: course::place(chassis.pose()),
             target_rpm: targets.map(AngularVelocity::as_rpm),
             measured_rpm: wheels.map(rpm),
+            steering_deg: None,
         });
         runner.tick(tick);
     }

@@ -17,7 +17,8 @@ use drivetrain::chassis::{Chassis, ChassisLimits, ModuleMotors, Swerve};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, M3508};
 use drivetrain::geometry::Vec2;
-use drivetrain::motor::{OneOf, VelocityDrive};
+use drivetrain::math::wrap;
+use drivetrain::motor::{AngleDrive, OneOf, VelocityDrive};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{ChassisConfig, Controller, Line, MotorConfig, Simulation, Wheel};
 use drivetrain::time::{Duration, Tick};
@@ -88,6 +89,11 @@ fn is_ready(robot: &mut Robot<'_>, tick: Tick) -> bool {
     robot.is_armed() || robot.arm(tick).is_ok()
 }
 
+/// From -180 to 180, and NaN for an angle that is not known.
+fn degrees(angles: [Option<Angle>; 4]) -> [f32; 4] {
+    angles.map(|angle| angle.map_or(f32::NAN, |angle| wrap(angle.as_degrees(), 360.0)))
+}
+
 fn drive(world: &Simulation) -> Result<Vec<Sample<4>>, Box<dyn Error>> {
     let (mut drives, mut steerings, modules) = robot(world)?;
     let mut chassis = Chassis::new(Swerve::new(WHEEL_RADIUS_M, MODULES.map(|(place, _)| place))?);
@@ -112,6 +118,9 @@ fn drive(world: &Simulation) -> Result<Vec<Sample<4>>, Box<dyn Error>> {
             course::command(&mut chassis, time_s, heading);
             let mut buses = (drives.device_mut(), steerings.device_mut());
             let targets = chassis.drive(&mut buses, modules, tick);
+            let steered = modules.map(|ModuleMotors { steering, zero, .. }| {
+                buses.angle(steering).map(|angle| angle - zero)
+            });
             let measured = modules.map(|module| buses.velocity(module.drive));
             samples.push(Sample {
                 time_s,
@@ -120,6 +129,9 @@ fn drive(world: &Simulation) -> Result<Vec<Sample<4>>, Box<dyn Error>> {
                 believed_m: course::place(chassis.pose()),
                 target_rpm: targets.map(|module| module.velocity.as_rpm()),
                 measured_rpm: measured.map(|wheel| wheel.map_or(0.0, AngularVelocity::as_rpm)),
+                steering_deg: Some(
+                    [targets.map(|module| Some(module.angle)), steered].map(degrees),
+                ),
             });
             drives.tick(tick);
         }

@@ -3,8 +3,12 @@
 #[path = "../output/mod.rs"]
 pub(crate) mod output;
 
+#[path = "../picture/axes.rs"]
+mod axes;
+
 pub(crate) use output::console;
 
+use axes::{Area, BLUE, RED, TIME, axes};
 use drivetrain::chassis::{Chassis, Kinematics};
 use drivetrain::geometry::{Heading, Pose2, Twist, Vec2, World};
 use drivetrain::sim;
@@ -38,6 +42,8 @@ pub(crate) struct Sample<const WHEELS: usize> {
     pub(crate) believed_m: Vec2,
     pub(crate) target_rpm: [f32; WHEELS],
     pub(crate) measured_rpm: [f32; WHEELS],
+    /// Targets and measured angles of the modules, counter-clockwise from forward, from -180 to 180, if the wheels are steered.
+    pub(crate) steering_deg: Option<[[f32; WHEELS]; 2]>,
 }
 
 /// Where the robot is to be, and how it is to move, `time_s` after the start.
@@ -124,10 +130,9 @@ pub(crate) fn judge<const WHEELS: usize>(samples: &[Sample<WHEELS>]) -> Result<(
     }
 }
 
-const COLORS: [RGBColor; 4] =
-    [RGBColor(200, 60, 40), RGBColor(30, 80, 180), RGBColor(40, 140, 60), RGBColor(150, 90, 170)];
+const COLORS: [RGBColor; 4] = [RED, BLUE, RGBColor(40, 140, 60), RGBColor(150, 90, 170)];
 
-/// Draws target (pale) and speed of every wheel, and the path.
+/// Draws target (pale) and speed of every wheel, its steering angle, and the path.
 pub(crate) fn plot<const WHEELS: usize>(
     path: &str,
     names: [&str; WHEELS],
@@ -135,46 +140,27 @@ pub(crate) fn plot<const WHEELS: usize>(
 ) -> Result<(), Box<dyn Error>> {
     // Created first: a path that cannot be written is an error of the file, not of the drawing.
     std::fs::File::create(path).map_err(|error| format!("{path}: {error}"))?;
-    let root = SVGBackend::new(path, (1200, 560)).into_drawing_area();
+    let steers = samples.iter().any(|sample| sample.steering_deg.is_some());
+    let root = SVGBackend::new(path, (1200, if steers { 900 } else { 560 })).into_drawing_area();
     root.fill(&WHITE)?;
-    let (speeds, map) = root.split_horizontally(680);
-    let end = samples.last().map_or(1.0, |sample| sample.time_s);
-    let reach = samples
-        .iter()
-        .flat_map(|sample| sample.target_rpm.into_iter().chain(sample.measured_rpm))
-        .fold(10.0_f32, |reach, rpm| reach.max(1.1 * rpm.abs()));
-    let mut chart = ChartBuilder::on(&speeds)
-        .caption("wheels, rpm (pale: target)", ("sans-serif", 16))
-        .margin(8)
-        .x_label_area_size(24)
-        .y_label_area_size(46)
-        .build_cartesian_2d(0.0..end, -reach..reach)?;
-    chart.configure_mesh().light_line_style(TRANSPARENT).draw()?;
-    for ((wheel, name), color) in names.into_iter().enumerate().zip(COLORS) {
-        let line = |rpm: fn(&Sample<WHEELS>) -> &[f32; WHEELS]| {
-            samples
-                .iter()
-                .step_by(5)
-                .filter_map(move |sample| Some((sample.time_s, *rpm(sample).get(wheel)?)))
-        };
-        chart.draw_series(LineSeries::new(line(|sample| &sample.target_rpm), color.mix(0.3)))?;
-        chart
-            .draw_series(LineSeries::new(line(|sample| &sample.measured_rpm), color))?
-            .label(name)
-            .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], color));
+    let (curves, map) = root.split_horizontally(680);
+    let rpm = |sample: &Sample<WHEELS>| Some([sample.target_rpm, sample.measured_rpm]);
+    let speeds = ("wheels (pale: target)", "rpm");
+    if steers {
+        let end = samples.last().map_or(END_S, |sample| sample.time_s);
+        let (above, below) = curves.split_vertically(450);
+        plot_wheels(&above, speeds, names, samples, None, rpm)?;
+        let angles = ("steering (pale: target, shaded: locked)", "degrees from forward");
+        plot_wheels(&below, angles, names, samples, Some((END_S, end)), |sample| {
+            sample.steering_deg
+        })?;
+    } else {
+        plot_wheels(&curves, speeds, names, samples, None, rpm)?;
     }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::LowerLeft)
-        .background_style(WHITE.mix(0.8))
-        .draw()?;
-    let mut chart = ChartBuilder::on(&map)
-        .caption("path, m (red: planned, blue: driven)", ("sans-serif", 16))
-        .margin(8)
-        .x_label_area_size(24)
-        .y_label_area_size(46)
-        .build_cartesian_2d(-0.2..SIDE_M + 0.2, -0.2..SIDE_M + 0.2)?;
-    chart.configure_mesh().light_line_style(TRANSPARENT).draw()?;
+    let (map, _) = map.split_vertically(560);
+    let side = -0.2..SIDE_M + 0.2;
+    let title = "path (red: planned, blue: driven)";
+    let mut chart = axes(&map, title, ("x, m", side.clone()), ("y, m", side), None)?;
     for (color, place) in COLORS
         .into_iter()
         .zip([(|sample| sample.planned_m) as fn(&Sample<WHEELS>) -> Vec2, |sample| sample.driven_m])
@@ -184,5 +170,43 @@ pub(crate) fn plot<const WHEELS: usize>(
     }
     root.present()?;
     console::line(format_args!("plot         {path}"));
+    Ok(())
+}
+
+/// Draws the targets and the measured values that `values` takes of a sample.
+fn plot_wheels<const WHEELS: usize>(
+    area: &Area<'_>,
+    (caption, unit): (&str, &str),
+    names: [&str; WHEELS],
+    samples: &[Sample<WHEELS>],
+    shaded: Option<(f32, f32)>,
+    values: fn(&Sample<WHEELS>) -> Option<[[f32; WHEELS]; 2]>,
+) -> Result<(), Box<dyn Error>> {
+    let end = samples.last().map_or(1.0, |sample| sample.time_s);
+    let every = samples.iter().filter_map(values).flatten().flatten();
+    let reach = every.fold(10.0_f32, |reach, value| reach.max(1.1 * value.abs()));
+    let mut chart = axes(area, caption, (TIME, 0.0..end), (unit, -reach..reach), shaded)?;
+    for ((wheel, name), color) in names.into_iter().enumerate().zip(COLORS) {
+        let lines = |of: usize, color: RGBAColor| {
+            let points = samples.iter().step_by(5).filter_map(|sample| {
+                Some((sample.time_s, *values(sample)?.get(of)?.get(wheel)?))
+                    .filter(|(_, value)| value.is_finite())
+            });
+            let points: Vec<_> = points.collect();
+            // An angle that wraps is two lines.
+            let parts = points.chunk_by(|(_, from), (_, to)| (to - from).abs() < 180.0);
+            parts.map(|part| PathElement::new(part, color)).collect::<Vec<_>>()
+        };
+        chart.draw_series(lines(0, color.mix(0.3)))?;
+        chart
+            .draw_series(lines(1, color.mix(1.0)))?
+            .label(name)
+            .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], color));
+    }
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::LowerLeft)
+        .background_style(WHITE.mix(0.8))
+        .draw()?;
     Ok(())
 }
