@@ -3,9 +3,9 @@ use core::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A number as the sum of two `f32`, of 48 bits: 1 in 10^14.
 ///
-/// For differences of large numbers: in `motion`, the distance that is left after stopping, of which a short move takes the cube
-/// root, so that an error of 1e-7 becomes one of 5e-3; in `state_space`, a Riccati equation. The algorithms are those of Dekker (1971) and Knuth (TAOCP 2, 4.2.2), without a fused
-/// multiply-add, which `core` does not have.
+/// For differences of large numbers: in `motion`, the distance after stopping, whose cube root is the time of a short move, so an error of
+/// 1e-7 becomes an error of 5e-3; in `state_space`, a Riccati equation. The algorithms of Dekker (1971) and Knuth (TAOCP 2, 4.2.2) are used
+/// without a fused multiply-add, which `core` lacks.
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Wide {

@@ -36,7 +36,7 @@ pub trait Decode: Sized {
     /// How many bytes of a frame tell its length, the header included: at least 1.
     const PREFIX: usize;
 
-    /// Returns the first bytes of every frame; none for a protocol that marks only the end of a frame.
+    /// Returns the first bytes of every frame; an empty slice if the protocol marks only the end of a frame.
     fn header(options: &Self::Options) -> &[u8];
 
     /// Returns the length of the whole frame in bytes, from its first [`PREFIX`](Self::PREFIX) bytes; `None` for an

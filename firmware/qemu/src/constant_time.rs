@@ -17,7 +17,7 @@ use drivetrain::time::{Duration, Instant, Tick};
 const TURNS: [i64; 3] = [0, 1_000_000, 1_000_000_000_000];
 
 /// Soon after power-on, across 2^32 µs (72 minutes), and after 13 days.
-const UP_TIMES: [Instant; 3] =
+pub const UP_TIMES: [Instant; 3] =
     [START, Instant::from_micros((1 << 32) - 500_000), Instant::from_micros(1 << 40)];
 
 const PERIOD: Duration = Duration::from_millis(1);

@@ -1,7 +1,9 @@
 //! Eight own motors of each other family, as a program drives them: with our speed loop, by torque or current.
 
+use crate::constant_time::UP_TIMES;
 use crate::meter::instructions;
 use crate::report::row;
+use crate::wiring::START;
 use core::fmt::Debug;
 use core::hint::black_box;
 use drivetrain::control::PidConfig;
@@ -112,10 +114,9 @@ struct Group<M, D> {
 }
 
 impl<M: OwnMotor + Debug, D: Drive> Group<M, D> {
-    fn new(motors: [M; MOTORS], drives: [D; MOTORS]) -> Self {
+    fn new(motors: [M; MOTORS], drives: [D; MOTORS], now: Instant) -> Self {
         let motors = motors.map(|motor| Own::new(motor).with_opening(Duration::ZERO));
         let (feedback, others) = ([None; MOTORS], [None; MOTORS]);
-        let now = Instant::from_micros(1_000);
         let mut group = Self { motors, drives, feedback, others, now };
         for cycle in 0..1_200 {
             group.cycle();
@@ -177,13 +178,22 @@ fn ingest<M: OwnMotor>(motors: &mut [Own<M>; MOTORS], feedback: &[CanFrame; MOTO
     }
 }
 
-/// Prints the tick, and a frame of the feedback. Commands do not arrive here, so the drives repeat their last frames; frames other than
-/// feedback come each 100 ms, and do not count.
-fn measure<M: OwnMotor + Debug, D: Drive>(names: [&str; 2], group: Group<M, D>) {
-    let Group { mut motors, feedback, others, mut now, .. } = group;
-    let feedback = feedback.map(Option::unwrap);
+/// Prints the tick, and a frame of the feedback: of other ids after each up-time, too. Commands do not arrive here, so the drives repeat
+/// their last frames; frames other than feedback come each 100 ms, and do not count.
+fn measure<M: OwnMotor + Debug, D: Drive>(
+    names: [&str; 3],
+    make: impl Fn([u8; MOTORS], Instant) -> Group<M, D>,
+) {
     let function = ingest as fn(&mut [Own<M>; MOTORS], &[CanFrame; MOTORS], Instant);
-    let frames = instructions(function, |ingest, _| ingest(&mut motors, &feedback, now));
+    let mut frames = [0; UP_TIMES.len()];
+    for (figure, (from, start)) in frames.iter_mut().zip((1..).zip(UP_TIMES)) {
+        let Group { mut motors, feedback, now, .. } = make(ids(from), start);
+        let feedback = feedback.map(Option::unwrap);
+        let all = instructions(function, |ingest, _| ingest(&mut motors, &feedback, now));
+        *figure = all / MOTORS as u32;
+    }
+    let Group { mut motors, feedback, others, mut now, .. } = make(ids(1), START);
+    let feedback = feedback.map(Option::unwrap);
     let function = whole as fn(&mut [Own<M>; MOTORS], &[CanFrame; MOTORS], Tick);
     let figure = instructions(function, |whole, call| {
         now = now + Duration::from_millis(1);
@@ -199,11 +209,12 @@ fn measure<M: OwnMotor + Debug, D: Drive>(names: [&str; 2], group: Group<M, D>) 
     });
     assert!(motors.iter().all(|motor| motor.guard().has_target()));
     row(names[0], &[figure]);
-    row(names[1], &[frames / MOTORS as u32]);
+    row(names[1], &frames[..1]);
+    row(names[2], &frames);
 }
 
-fn ids() -> [u8; MOTORS] {
-    core::array::from_fn(|index| black_box(index as u8 + 1))
+fn ids(from: u8) -> [u8; MOTORS] {
+    core::array::from_fn(|index| black_box(index as u8 + from))
 }
 
 /// 3 Nm at most.
@@ -215,29 +226,37 @@ fn torque() -> ImpedanceControl {
 pub fn rows() {
     let model = lk::Model::MF9025_16T;
     let amperes = model.series().amperes_per_count();
-    let motors = ids().map(|id| lk::Motor::new(model, id, torque()).unwrap());
-    let drives = ids().map(|id| LkDrive::new(id, amperes, model.torque_constant(), 1.0, 16));
-    measure(["lk_tick", "lk_ingest"], Group::new(motors, drives));
+    measure(["lk_tick", "lk_ingest", "constant_ingest_lk"], |ids, start| {
+        let motors = ids.map(|id| lk::Motor::new(model, id, torque()).unwrap());
+        let drives = ids.map(|id| LkDrive::new(id, amperes, model.torque_constant(), 1.0, 16));
+        Group::new(motors, drives, start)
+    });
 
     let model = rmd::Model::X8_120;
-    let motors = ids().map(|id| rmd::Motor::new(model, id, torque()).unwrap());
-    let drives = ids().map(|id| RmdDrive::new(id, model.torque_constant()));
-    measure(["rmd_tick", "rmd_ingest"], Group::new(motors, drives));
+    measure(["rmd_tick", "rmd_ingest", "constant_ingest_rmd"], |ids, start| {
+        let motors = ids.map(|id| rmd::Motor::new(model, id, torque()).unwrap());
+        let drives = ids.map(|id| RmdDrive::new(id, model.torque_constant()));
+        Group::new(motors, drives, start)
+    });
 
     let model = robstride::Model::RS02;
     let ranges = [model.pmax_rad(), model.vmax_rad_per_s(), model.tmax_nm(), 500.0, 5.0];
-    let motors = ids().map(|id| robstride::Motor::new(model, id, torque()).unwrap());
-    let drives = ids().map(|id| RobStrideDrive::new(id, ranges));
-    measure(["robstride_tick", "robstride_ingest"], Group::new(motors, drives));
+    measure(["robstride_tick", "robstride_ingest", "constant_ingest_robstride"], |ids, start| {
+        let motors = ids.map(|id| robstride::Motor::new(model, id, torque()).unwrap());
+        let drives = ids.map(|id| RobStrideDrive::new(id, ranges));
+        Group::new(motors, drives, start)
+    });
 
     let (model, firmware) = (odrive::Model::D6374, odrive::Firmware::V0_6);
     let fastest = AngularVelocity::from_rad_per_s(20.0);
-    let motors =
-        ids().map(|id| odrive::Motor::new(model, firmware, id, fastest, torque()).unwrap());
-    let drives = ids().map(|id| {
-        OdriveDrive::new(id, true, model.torque_constant(), 1.0).with_periods(0.1, 0.001)
+    measure(["odrive_tick", "odrive_ingest", "constant_ingest_odrive"], |ids, start| {
+        let motors =
+            ids.map(|id| odrive::Motor::new(model, firmware, id, fastest, torque()).unwrap());
+        let drives = ids.map(|id| {
+            OdriveDrive::new(id, true, model.torque_constant(), 1.0).with_periods(0.1, 0.001)
+        });
+        Group::new(motors, drives, start)
     });
-    measure(["odrive_tick", "odrive_ingest"], Group::new(motors, drives));
 
     let model = vesc::Model {
         name: "hub",
@@ -256,7 +275,9 @@ pub fn rows() {
         no_load_rad_per_s: 60.0,
     };
     let mode = vesc::Mode::current_with_speed_loop(SPEED_LOOP).unwrap();
-    let motors = ids().map(|id| vesc::Motor::new(model, id, mode).unwrap());
-    let drives = ids().map(|id| Vesc(VescDrive::new(id, motor), false));
-    measure(["vesc_tick", "vesc_ingest"], Group::new(motors, drives));
+    measure(["vesc_tick", "vesc_ingest", "constant_ingest_vesc"], |ids, start| {
+        let motors = ids.map(|id| vesc::Motor::new(model, id, mode).unwrap());
+        let drives = ids.map(|id| Vesc(VescDrive::new(id, motor), false));
+        Group::new(motors, drives, start)
+    });
 }

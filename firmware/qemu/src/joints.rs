@@ -1,7 +1,9 @@
 //! Eight joints of Damiao in MIT mode, as a program drives them: each an own motor with our speed loop.
 
+use crate::constant_time::UP_TIMES;
 use crate::meter::instructions;
 use crate::report::row;
+use crate::wiring::START;
 use core::hint::black_box;
 use drivetrain::control::PidConfig;
 use drivetrain::damiao::{Model, Motor};
@@ -24,8 +26,8 @@ struct Arm {
 
 impl Arm {
     /// Makes eight joints that are driven. Their drives have one master id, or each its own.
-    fn new(is_shared: bool, is_armed: bool) -> Self {
-        let ids: [u8; MOTORS] = core::array::from_fn(|index| index as u8 + 1);
+    fn new(is_shared: bool, is_armed: bool, from: u8, now: Instant) -> Self {
+        let ids: [u8; MOTORS] = core::array::from_fn(|index| index as u8 + from);
         let master_id = |id: u8| if is_shared { 0x7E } else { 0x10 + u16::from(id) };
         let mode = ImpedanceControl::new(3.0).unwrap();
         let mode = mode.with_loops(PidConfig::new(10.0, 0.0, 0.0), PidConfig::new(0.8, 4.0, 0.001));
@@ -35,7 +37,6 @@ impl Arm {
             Own::new(motor.with_master_id(master_id(id)).unwrap()).with_opening(Duration::ZERO)
         });
         let drives = ids.map(|id| DamiaoDrive::new(id, master_id(id), [12.5, 30.0, 10.0]));
-        let now = Instant::from_micros(1_000);
         let mut arm = Self { joints, drives, answers: [None; MOTORS], now };
         for cycle in 0..300 {
             arm.cycle();
@@ -109,7 +110,7 @@ fn joints_ingest(joints: &mut Joints, answers: &[CanFrame; MOTORS], now: Instant
 
 /// Commands do not arrive here, so the drives answer with what they had: the targets are the same in each cycle.
 fn tick(is_shared: bool, is_armed: bool) -> u32 {
-    let Arm { mut joints, answers, now, .. } = Arm::new(is_shared, is_armed);
+    let Arm { mut joints, answers, now, .. } = Arm::new(is_shared, is_armed, 1, START);
     let answers = answers.map(Option::unwrap);
     let mut now = now;
     instructions(joints_tick as fn(&mut Joints, &[CanFrame; MOTORS], Tick), |tick, _| {
@@ -121,8 +122,8 @@ fn tick(is_shared: bool, is_armed: bool) -> u32 {
     })
 }
 
-fn ingest(is_shared: bool) -> u32 {
-    let Arm { mut joints, answers, now, .. } = Arm::new(is_shared, true);
+fn ingest(is_shared: bool, from: u8, start: Instant) -> u32 {
+    let Arm { mut joints, answers, now, .. } = Arm::new(is_shared, true, from, start);
     let answers = answers.map(Option::unwrap);
     let function = joints_ingest as fn(&mut Joints, &[CanFrame; MOTORS], Instant);
     let whole = instructions(function, |ingest, _| ingest(&mut joints, &answers, now));
@@ -133,6 +134,11 @@ pub fn rows() {
     row("joints_tick", &[tick(false, true)]);
     row("joints_tick_shared", &[tick(true, true)]);
     row("joints_disarmed", &[tick(false, false)]);
-    row("joints_ingest", &[ingest(false)]);
-    row("joints_ingest_shared", &[ingest(true)]);
+    row("joints_ingest", &[ingest(false, 1, START)]);
+    row("joints_ingest_shared", &[ingest(true, 1, START)]);
+    let mut frames = [0; UP_TIMES.len()];
+    for (figure, (from, start)) in frames.iter_mut().zip((1..).zip(UP_TIMES)) {
+        *figure = ingest(false, from, start);
+    }
+    row("constant_ingest_damiao", &frames);
 }

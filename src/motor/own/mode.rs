@@ -76,7 +76,7 @@ impl ControlMode {
         Self { number, follows: Follows::Angle, velocity_limit, torque_limit_nm }
     }
 
-    /// Limits the velocities of the drive's own loop, and of a target that the shaft is to keep.
+    /// Limits the velocities of the drive's own loop, and of a held target.
     pub(crate) fn within(self, velocity_limit: AngularVelocity) -> Self {
         Self { velocity_limit: Some(velocity_limit), ..self }
     }
