@@ -13,7 +13,7 @@ use drivetrain::error::ConfigError;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{AngleDrive, Devices, Ingest, Malformed, Own, OwnMotor, VelocityDrive};
 use drivetrain::odrive::{Endpoints, Feedback, Firmware, Heartbeat, Mode, Model, Motor};
-use drivetrain::sim::DriveShaft;
+use drivetrain::sim::{DriveShaft, OdriveDrive};
 use drivetrain::time::{Duration, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use embedded_can::{Frame, StandardId};
@@ -394,6 +394,42 @@ fn a_driver_that_takes_no_frames_for_a_while_does_not_lose_the_mode() {
     }
     bench.steps(400, |bench| bench.own.set_torque(0.5).unwrap());
     assert_eq!((bench.drive.state(), bench.drive.modes()), (Heartbeat::CLOSED_LOOP, (1, 1)));
+}
+
+/// In firmware 0.5 the frames that wait for the heartbeat are polls, and a poll given back is no request given back.
+#[test]
+fn polls_that_the_bus_gives_back_request_closed_loop_no_second_time() {
+    let mut bench = Bench::new(torque(), Firmware::V0_5);
+    let drive = OdriveDrive::new(3, false, Model::D6374.torque_constant(), GEAR);
+    bench.drive = drive.with_periods(0.1, 0.0);
+    bench.steps(400, |_| {});
+    bench.own.arm(bench.now()).unwrap();
+    let (mut requests, mut given_back) = (0, 0);
+    for _ in 0..400 {
+        _ = bench.own.set_torque(0.5);
+        bench.now_us += 1_000;
+        let now = bench.now();
+        bench.own.update(Tick::new(now, 0.001));
+        while let Some(frame) = bench.own.next_frame(0) {
+            let is_request = frame.header() == 0x67 && frame.bytes()[0] == Heartbeat::CLOSED_LOOP;
+            requests += u32::from(is_request);
+            if requests > 0 && frame.is_remote_frame() {
+                // With earlier polls, which waited in mailboxes.
+                (0..4).for_each(|_| _ = bench.own.requeue(&frame));
+                given_back += 1;
+            }
+            // The axis does not follow.
+            if let Some(answer) = bench.drive.hear(&frame).filter(|_| !is_request) {
+                _ = Devices::ingest(&mut bench.own, &answer, now);
+            }
+        }
+        bench.drive.step(0.001);
+        while let Some(frame) = bench.drive.next_frame().filter(|_| requests == 0) {
+            _ = Devices::ingest(&mut bench.own, &frame, now);
+        }
+    }
+    assert!(given_back > 30 && Devices::is_armed(&mut bench.own), "{given_back}");
+    assert_eq!(requests, 1);
 }
 
 /// The frame is withdrawn by an update without a step, before the driver took it.

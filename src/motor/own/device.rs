@@ -53,12 +53,12 @@ impl<M: OwnMotor> CanDevice for Own<M> {
 
     /// Each update offers the newest command anyway. A frame for the drive's power comes again if still wanted.
     fn requeue(&mut self, frame: &CanFrame) -> bool {
-        if self.switched == Some(*frame) {
-            self.power.give_back();
-            self.enabling = self.enabling.saturating_sub(1);
-        }
         // Of an id that several motors send, only the frames that this one sent.
         let is_known = [self.switched, self.last].contains(&Some(*frame));
+        // Once: a poll may have the same bytes.
+        if self.switched.take_if(|switched| switched == frame).is_some() {
+            self.give_back();
+        }
         let may_send = |claim: Claim| {
             let is_its = is_known || !claim.is_shared();
             claim.role() == Role::Command && is_its && claim.covers(frame.id())
@@ -215,8 +215,7 @@ impl<M: OwnMotor> Own<M> {
         let stays = self.guard.has_target() && self.power.is_on() && !self.rest_disables;
         if stays && !may_drive {
             if self.switching.is_some() {
-                self.power.give_back();
-                self.enabling = self.enabling.saturating_sub(1);
+                self.give_back();
                 self.withdraw(|own| &mut own.switching);
             }
             return;
@@ -258,6 +257,12 @@ impl<M: OwnMotor> Own<M> {
         let frame = self.motor.disable();
         self.rest_disables = frame.is_none();
         self.post(frame);
+    }
+
+    /// A frame for the drive's power was not sent, and comes again.
+    const fn give_back(&mut self) {
+        self.power.give_back();
+        self.enabling = self.enabling.saturating_sub(1);
     }
 
     /// Offers a frame for the drive's power.
