@@ -77,7 +77,7 @@ impl TimeStep {
             return None;
         }
         if dt_max_s.is_nan() {
-            return Some(Self { dt_s, half_dt_s: 0.5 * dt_s, per_dt: 1.0 / dt_s });
+            return Self::usable(dt_s, f32::INFINITY);
         }
         // With a longest step of zero or less every step holds.
         let frozen = Self { dt_s: dt_max_s, half_dt_s: f32::INFINITY, per_dt: f32::INFINITY };

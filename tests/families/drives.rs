@@ -12,6 +12,13 @@ macro_rules! usual {
         fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
             self.0.hear(frame)
         }
+        passive!();
+    };
+}
+
+/// All but the reaction to a frame.
+macro_rules! passive {
+    () => {
         fn step(&mut self, dt_s: f32) {
             self.0.step(dt_s);
         }
@@ -197,15 +204,7 @@ impl Drive for Odrive {
         let is_lost = !self.1 && raw(frame) == 0x6B;
         if is_lost { None } else { self.0.hear(frame) }
     }
-    fn step(&mut self, dt_s: f32) {
-        self.0.step(dt_s);
-    }
-    fn shaft(&self) -> &DriveShaft {
-        self.0.shaft()
-    }
-    fn lose_supply(&mut self) {
-        self.0.lose_supply();
-    }
+    passive!();
     fn reports(&mut self) -> Vec<CanFrame> {
         std::iter::from_fn(|| self.0.next_frame()).collect()
     }

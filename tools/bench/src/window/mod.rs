@@ -17,7 +17,7 @@ use crate::pace::Pace;
 use keys::Ui;
 use ratatui::crossterm::cursor::Show;
 use ratatui::crossterm::event::{
-    self, DisableBracketedPaste, EnableBracketedPaste, Event, KeyEventKind,
+    self, DisableBracketedPaste, EnableBracketedPaste, Event, KeyCode, KeyEventKind,
 };
 use ratatui::crossterm::execute;
 use ratatui::crossterm::terminal::{LeaveAlternateScreen, disable_raw_mode};
@@ -178,7 +178,8 @@ fn show(shared: &Shared, actions: &Sender<Action>, end: &End, defects: Defects) 
                 continue;
             }
         };
-        let is_followed = event::poll(Duration::ZERO)?;
+        let arms = key.code == KeyCode::Char('A');
+        let is_followed = event::poll(if arms { TOGETHER } else { Duration::ZERO })?;
         let is_alone = !is_followed && Instant::now() >= alone_from;
         // A key that waits behind this one is not alone, however long the picture between them takes.
         alone_from = Instant::now() + if is_followed { Duration::from_secs(1) } else { TOGETHER };
