@@ -145,7 +145,7 @@ DEFECTS = [
      "if !moves_on || TimeStep::new", "if TimeStep::new"),
     ("snake", "any request to the joints counts", "src/snake/device.rs",
      "granted &= slot.guard.ask();", "granted |= slot.guard.ask();"),
-    ("snake", "arming again makes a target younger", "src/motor/safety/guard.rs",
+    ("snake", "arming again makes a target younger", "src/motor/guard.rs",
      "let begins =\n            self.device.may_engage", "self.motor.renew_target(now.stamp());\n        let begins =\n            self.device.may_engage"),
     ("drives", "feedback is never late", "src/motor/safety/motor.rs",
      "Link::Online if self.is_fresh(now, timeouts) => true,", "Link::Online => true,"),

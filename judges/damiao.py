@@ -415,7 +415,7 @@ class Trial:
 
     def registers(self):
         """The table of the source, that of the program, and that of the judge."""
-        source = pathlib.Path(__file__).parent.parent / "src/damiao/register.rs"
+        source = pathlib.Path(__file__).parent.parent / "src/damiao/model.rs"
         rows = re.findall(r"^    \w+ (\d+) ([FU]32) (R[wo]) \"", source.read_text(), re.MULTILINE)
         kinds = {"F32": "float", "U32": "uint32"}
         source = {int(n): (kinds[kind], access.upper()) for n, kind, access in rows}

@@ -55,7 +55,6 @@ mod command;
 mod config;
 mod feedback;
 mod model;
-mod register;
 #[cfg(test)]
 mod tests;
 
@@ -63,5 +62,4 @@ pub use bus::Motor;
 pub use command::Command;
 pub use config::Mode;
 pub use feedback::{Feedback, Status};
-pub use model::Model;
-pub use register::Register;
+pub use model::{Model, Register};

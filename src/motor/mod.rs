@@ -35,6 +35,7 @@ mod claim;
 mod device;
 mod devices;
 mod drive;
+mod guard;
 mod health;
 mod homing;
 mod link;
@@ -54,6 +55,7 @@ pub use claim::{Claim, Role};
 pub use device::{CanDevice, Ingest, Malformed};
 pub use devices::Devices;
 pub use drive::{AngleDrive, OneOf, TargetError, VelocityDrive};
+pub use guard::Guard;
 pub use health::{Condition, Conditions, Edge, Health, HealthConfig, Reaction};
 pub(crate) use health::{Journal, Latch, Monitor, Rival, Sample, Traffic, elapsed};
 pub use homing::{HomingStep, ShaftState, StopHoming};
@@ -67,8 +69,8 @@ pub(crate) use own::{
     register_questions, registers,
 };
 pub use own::{Impedance, ImpedanceControl, Inquiry, Order, Own, OwnMotor, Settings, Target};
+pub use safety::OPENING;
 pub(crate) use safety::{Ages, DeviceGuard, Hold, LONGEST_PAUSE, MotorGuard, Rest, age, take_age};
-pub use safety::{Guard, OPENING};
 pub use setting::WrongSetting;
 pub(crate) use visitor::Ask;
 pub use visitor::Visitor;

@@ -1,6 +1,6 @@
 //! The user's choices: the motor, its control mode, and the endpoints of its drive; and the state of the motor.
 
-use super::enabling::Phase;
+use super::bus::Phase;
 use super::{Feedback, Firmware, Heartbeat, Model};
 use crate::error::ConfigError;
 use crate::motor::{ControlMode, Form, ImpedanceControl, Preparation, Settings, Told};

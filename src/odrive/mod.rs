@@ -79,7 +79,6 @@
 mod bus;
 mod command;
 mod config;
-mod enabling;
 mod feedback;
 mod model;
 #[cfg(test)]

@@ -1,7 +1,6 @@
 //! The motor and its settings; the control mode is shared with `lk`, with the scales of the output shaft.
 
-use super::enabling::Enabling;
-use super::track::Track;
+use super::bus::{Enabling, Track};
 use super::{Command, Feedback, Model, State};
 use crate::error::ConfigError;
 pub use crate::lk::Mode;

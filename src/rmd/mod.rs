@@ -91,12 +91,10 @@
 mod bus;
 mod command;
 mod config;
-mod enabling;
 mod feedback;
 mod model;
 #[cfg(test)]
 mod tests;
-mod track;
 
 pub use command::Command;
 pub use config::{Mode, Motor};

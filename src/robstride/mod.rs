@@ -84,7 +84,6 @@ mod command;
 mod config;
 mod feedback;
 mod model;
-mod register;
 #[cfg(test)]
 mod tests;
 
@@ -92,5 +91,4 @@ pub use bus::Motor;
 pub use command::Command;
 pub use config::Mode;
 pub use feedback::{Feedback, Status};
-pub use model::Model;
-pub use register::Register;
+pub use model::{Model, Register};

@@ -293,7 +293,10 @@ proptest! {
             filter.correct(&[0.0]);
         }
         filter.predict(&[0.0]);
-        prop_assert!(near(&filter.covariance(), &narrow(&steady).unwrap(), 1e-4), "{:?} {steady:?}", filter.covariance());
+        let steady = narrow(&steady).unwrap();
+        // A correction cancels most of a large covariance, and the next ones take back as little of its rounding.
+        let rounding = 2e-7 * largest(&steady) * largest(&steady);
+        prop_assert!(near(&filter.covariance(), &steady, 1e-4 + rounding), "{:?} {steady:?}", filter.covariance());
     }
 
     #[test]

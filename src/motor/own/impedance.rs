@@ -1,99 +1,11 @@
-//! Impedance: a target, and the control of a drive in impedance mode.
+//! The control of a drive in impedance mode, and our own loops on torque.
 
-use super::{Order, Shaft, Target, TorqueLoops};
-use crate::control::{PidConfig, limited};
+use super::{Impedance, Order, Shaft, Target};
+use crate::control::{Cascade, PidConfig, limited};
 use crate::error::ConfigError;
 use crate::math::wrap_pi;
 use crate::motor::{Capabilities, Capability};
 use crate::units::{Angle, AngularVelocity};
-use crate::wire::mit::{self, Ranges};
-
-/// A spring and a damper at the output shaft, with a torque beside both: the target of a joint of an arm or a leg.
-///
-/// The torque is `stiffness * (angle - measured angle) + damping * (velocity - measured velocity) + torque`, within the limits
-/// of the motor.
-///
-/// # Examples
-/// ```
-/// use drivetrain::motor::Impedance;
-/// use drivetrain::units::Angle;
-///
-/// let hold = Impedance { angle: Angle::from_degrees(30.0), stiffness: 20.0, damping: 0.6, ..Impedance::FREE };
-/// assert!(hold.is_finite() && hold.torque_nm == 0.0);
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Impedance {
-    /// The angle where the spring is at rest, in the range of the motor's own angle: turns count.
-    pub angle: Angle,
-    /// The velocity at which the damper is at rest.
-    pub velocity: AngularVelocity,
-    /// The stiffness of the spring in Nm/rad, not negative.
-    pub stiffness: f32,
-    /// The damping in Nm s/rad, not negative.
-    pub damping: f32,
-    /// The torque beside both, in Nm; positive is counter-clockwise: the weight of an arm, say.
-    pub torque_nm: f32,
-}
-
-impl Impedance {
-    /// Neither spring nor damper, and no torque.
-    pub const FREE: Self = Self {
-        angle: Angle::ZERO,
-        velocity: AngularVelocity::ZERO,
-        stiffness: 0.0,
-        damping: 0.0,
-        torque_nm: 0.0,
-    };
-
-    /// Returns the largest value of each field of a frame.
-    pub(crate) const fn most(ranges: &Ranges) -> Self {
-        Self::of(ranges, 1.0, 1.0, 1.0)
-    }
-
-    /// Returns the value of a count of each field, for fields up to `top`; the field of the angle goes to 65535.
-    pub(crate) const fn count(ranges: &Ranges, top: u16) -> Self {
-        let top = top as f32;
-        Self::of(ranges, 2.0 / 65_535.0, 2.0 / top, 1.0 / top)
-    }
-
-    const fn of(ranges: &Ranges, angle: f32, signed: f32, gain: f32) -> Self {
-        let (stiffness, damping) = ranges.gains();
-        Self {
-            angle: Angle::from_radians(ranges.position_rad() * angle),
-            velocity: AngularVelocity::from_rad_per_s(ranges.velocity_rad_per_s() * signed),
-            stiffness: stiffness * gain,
-            damping: damping * gain,
-            torque_nm: ranges.torque_nm() * signed,
-        }
-    }
-
-    /// Tells whether each value is finite, and stiffness and damping are not negative.
-    #[must_use]
-    pub const fn is_finite(&self) -> bool {
-        self.angle.is_finite()
-            && self.velocity.is_finite()
-            && self.stiffness.is_finite()
-            && self.damping.is_finite()
-            && self.torque_nm.is_finite()
-            && self.stiffness >= 0.0
-            && self.damping >= 0.0
-    }
-}
-
-impl From<Impedance> for mit::Command {
-    fn from(impedance: Impedance) -> Self {
-        let Impedance { angle, velocity, stiffness, damping, torque_nm } = impedance;
-        Self {
-            position_rad: angle.as_radians(),
-            velocity_rad_per_s: velocity.as_rad_per_s(),
-            kp: stiffness,
-            kd: damping,
-            torque_nm,
-        }
-    }
-}
 
 /// The control of a drive that follows an [`Impedance`], as in MIT mode: any target becomes an impedance with a torque that keeps
 /// within a limit.
@@ -330,4 +242,136 @@ fn within(difference: f32, beside_nm: f32, gain: f32, limit: f32) -> f32 {
         return 0.0;
     }
     difference.min((limit - beside_nm) / gain).max((-limit - beside_nm) / gain)
+}
+
+/// A loop from the way to an angle, in rad, to a velocity, and a loop from a velocity, in rad/s, to a torque in Nm.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TorqueLoops {
+    loops: Cascade,
+    before: Before,
+}
+
+/// The target of the step before.
+#[derive(Debug, Clone, Copy)]
+enum Before {
+    /// Or an impedance, which has no loops: they begin anew.
+    Rest,
+    /// In Nm, within the limit.
+    Torque(f32),
+    Velocity,
+    Angle,
+}
+
+impl TorqueLoops {
+    /// # Errors
+    /// As [`Cascade::new`].
+    pub(crate) fn new(position: PidConfig, speed: PidConfig) -> Result<Self, ConfigError> {
+        Ok(Self { loops: Cascade::new(position, speed)?, before: Before::Rest })
+    }
+
+    /// Returns the torque for a velocity or an angle, possibly more than the limit; `None` for another target, and for an angle
+    /// target without a measured angle. The integral keeps within the limit. The loops take over from a torque without a jump, and
+    /// begin anew after an impedance.
+    #[inline]
+    pub(crate) fn step(
+        &mut self,
+        order: Order,
+        (angle, velocity): Shaft,
+        limit_nm: f32,
+    ) -> Option<f32> {
+        let velocity = velocity.as_rad_per_s();
+        let torque_nm = match order.target {
+            Target::Velocity(target) => {
+                if !matches!(self.before, Before::Velocity) {
+                    self.take_over(Before::Velocity, velocity);
+                }
+                self.loops.speed_mut().step(target.as_rad_per_s(), velocity, &order.step)
+            }
+            Target::Angle(target) => {
+                let way = wrap_pi((target - angle?).as_radians());
+                if !matches!(self.before, Before::Angle) {
+                    self.take_over(Before::Angle, velocity);
+                }
+                self.loops.step(way, velocity, &order.step)
+            }
+            Target::Torque(torque_nm) => {
+                self.before = Before::Torque(limited(torque_nm, -limit_nm, limit_nm));
+                return None;
+            }
+            Target::Impedance(_) => {
+                self.before = Before::Rest;
+                return None;
+            }
+        };
+        self.loops.speed_mut().keep_integral_between(-limit_nm, limit_nm);
+        Some(torque_nm)
+    }
+
+    /// Continues from the output of the target before, so that a change of the kind of target does not jump.
+    #[cold]
+    fn take_over(&mut self, now: Before, velocity: f32) {
+        match core::mem::replace(&mut self.before, now) {
+            Before::Rest => self.loops.reset(),
+            Before::Torque(torque_nm) => {
+                self.loops.position_mut().reset_to(velocity);
+                self.loops.speed_mut().reset_to(torque_nm);
+            }
+            Before::Velocity => self.loops.position_mut().reset_to(velocity),
+            Before::Angle => {}
+        }
+    }
+
+    pub(crate) const fn reset(&mut self) {
+        self.before = Before::Rest;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motor::Impedance;
+    use crate::time::TimeStep;
+    use crate::units::{Angle, AngularVelocity};
+
+    const LIMIT_NM: f32 = 3.0;
+
+    fn driven() -> (TorqueLoops, impl Fn(&mut TorqueLoops, Target) -> Option<f32>) {
+        let position = PidConfig::new(10.0, 1.0, 0.0).with_output_limit(8.0);
+        let loops = TorqueLoops::new(position, PidConfig::new(0.5, 20.0, 0.0)).unwrap();
+        let step = |loops: &mut TorqueLoops, target| {
+            let order = Order { target, share: 1.0, step: TimeStep::of(0.001) };
+            loops.step(order, (Some(Angle::ZERO), AngularVelocity::ZERO), LIMIT_NM)
+        };
+        (loops, step)
+    }
+
+    fn velocity(rad_per_s: f32) -> Target {
+        Target::Velocity(AngularVelocity::from_rad_per_s(rad_per_s))
+    }
+
+    /// A blocked shaft fills the integral. This integral must not drive the shaft after another kind of target.
+    #[test]
+    fn nothing_of_an_integral_is_left_after_another_kind_of_target() {
+        let (mut loops, step) = driven();
+        for between in [Target::Torque(0.0), Target::Impedance(Impedance::FREE)] {
+            for _ in 0..200 {
+                step(&mut loops, velocity(1.0));
+            }
+            assert!(loops.loops.speed().terms().i > 2.0);
+            assert_eq!(step(&mut loops, between), None);
+            assert_eq!(step(&mut loops, velocity(0.0)), Some(0.0), "{between:?}");
+            assert_eq!(step(&mut loops, between), None);
+            assert_eq!(step(&mut loops, Target::Angle(Angle::ZERO)), Some(0.0), "{between:?}");
+        }
+    }
+
+    #[test]
+    fn a_velocity_after_a_torque_begins_with_this_torque_within_the_limit() {
+        let (mut loops, step) = driven();
+        for (torque_nm, begins) in [(1.5, 1.5), (-2.0, -2.0), (9.0, LIMIT_NM)] {
+            step(&mut loops, Target::Torque(torque_nm));
+            let first = step(&mut loops, velocity(0.0)).unwrap();
+            assert!((first - begins).abs() < 1e-6, "{first} Nm after {torque_nm} Nm");
+        }
+    }
 }

@@ -4,40 +4,37 @@ mod device;
 mod impedance;
 mod mode;
 mod motor;
-mod order;
 mod power;
 mod questions;
-mod receive;
 mod registers;
 mod route;
 mod settings;
-mod told;
-mod torque_loops;
 mod turns;
 
-pub use impedance::{Impedance, ImpedanceControl};
-pub use motor::OwnMotor;
-pub use order::{Order, Target};
+pub use impedance::ImpedanceControl;
+pub(crate) use impedance::TorqueLoops;
+pub use motor::{Impedance, Order, OwnMotor, Target};
 pub use settings::{Inquiry, Settings};
 
 pub(crate) use mode::{ControlMode, Goal, Shaft, inside};
-pub(crate) use questions::Questions;
-pub(crate) use receive::ingest_eight;
+pub(crate) use motor::ingest_eight;
+pub(crate) use questions::{Questions, Told};
 pub(crate) use registers::{
     Form, code_from, lowest_bit, mit_model, models, register_questions, registers,
 };
 pub(crate) use settings::{Preparation, TimeoutUnits};
-pub(crate) use told::Told;
-pub(crate) use torque_loops::TorqueLoops;
+
 pub(crate) use turns::{Laps, Tachometer};
 
 use super::{
     AngleDrive, BusLoad, CanDevice, Capabilities, Capability, Claim, Devices, Guard, Health,
-    HealthConfig, Link, Role, TargetError, Timeouts, VelocityDrive, Visitor, Watch,
+    HealthConfig, Ingest, Link, Role, Severity, TargetError, Timeouts, VelocityDrive, Visitor,
+    Vitals, Watch,
 };
 use crate::frame::CanFrame;
 use crate::time::{Duration, Instant};
 use crate::units::{Angle, AngularVelocity};
+use embedded_can::Frame;
 use power::Power;
 use route::Route;
 
@@ -283,6 +280,59 @@ impl<M: OwnMotor> Own<M> {
 
     fn is_online(&self) -> bool {
         self.guard.link() == Link::Online
+    }
+}
+
+/// Received frames: feedback, answers, and commands of another controller.
+impl<M: OwnMotor> Own<M> {
+    /// Takes a frame with an id of the feedback.
+    pub(super) fn take(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
+        if self.motor.decode_answer(frame) {
+            return Ingest::Taken;
+        }
+        let outcome = self.motor.decode(frame);
+        if outcome == Ingest::Taken {
+            self.watch.hear(&self.guard, now);
+            self.guard.hear(now);
+            self.hear_power(now);
+        }
+        outcome
+    }
+
+    #[inline(never)]
+    pub(super) fn take_by_claims(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
+        if frame.is_remote() {
+            return Ingest::Unrelated;
+        }
+        if self.route.is_unknown() {
+            self.route = Route::of(|| self.motor.claims());
+        }
+        let (mut is_feedback, mut command) = (false, None);
+        for claim in self.motor.claims().into_iter().filter(|claim| claim.covers(frame.id())) {
+            match claim.role() {
+                Role::Feedback => is_feedback = true,
+                // What others send on a shared id may be for another drive.
+                Role::Command if claim.is_shared() => {}
+                Role::Command => command = Some(claim),
+            }
+        }
+        let outcome = if is_feedback { self.take(frame, now) } else { Ingest::Unrelated };
+        if outcome == Ingest::Unrelated && command.is_some() {
+            self.rival = command;
+            self.watch.hear_rival(now);
+        }
+        outcome
+    }
+
+    /// Takes the drive's report of its power.
+    fn hear_power(&mut self, now: Instant) {
+        if !self.power.hear(self.motor.is_enabled(), now) {
+            return;
+        }
+        let vitals = Vitals { error: Some(Severity::Fault), ..self.motor.vitals() };
+        _ = self.watch.check(&mut self.guard, || vitals, now);
+        self.guard.relax_until_armed();
+        self.motor.forget_settings();
     }
 }
 

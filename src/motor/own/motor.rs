@@ -1,9 +1,12 @@
 //! The part of a motor of your own with its ids, frames and loop.
 
-use super::Order;
 use crate::frame::CanFrame;
-use crate::motor::{Capabilities, Capability, Claim, Ingest, MotorName, Vitals, WrongSetting};
+use crate::motor::{
+    Capabilities, Capability, Claim, Ingest, Malformed, MotorName, Vitals, WrongSetting,
+};
+use crate::time::TimeStep;
 use crate::units::{Angle, AngularVelocity};
+use crate::wire::mit::{self, Ranges};
 
 /// A motor of your own: its ids, its frames and its loop.
 ///
@@ -135,4 +138,130 @@ pub trait OwnMotor {
     fn vitals(&self) -> Vitals {
         Vitals::default()
     }
+}
+
+/// A target of the output shaft. The target is finite, and of a kind among the motor's capabilities.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Target {
+    /// A torque in Nm; positive is counter-clockwise.
+    Torque(f32),
+    /// A velocity.
+    Velocity(AngularVelocity),
+    /// An angle, by the shortest way; the number of turns does not matter.
+    Angle(Angle),
+    /// A spring and a damper.
+    Impedance(Impedance),
+}
+
+/// A target with its limits, for one step: see [`OwnMotor::control`](super::OwnMotor::control).
+///
+/// Destructure it, `let Order { target, share, step } = order;`: the compiler then warns if a field is not used.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Order {
+    /// The target. While the output range opens, the angle of a position or of a spring moves from the measured angle to the
+    /// requested one.
+    pub target: Target,
+    /// The share of the full output that is allowed, 0 to 1: the share rises from 0 after arming, and falls while the motor is warm
+    /// or stalled. Keep the command within this share of its range, or multiply the gains of the drive by the share.
+    pub share: f32,
+    /// The time since the step before. Never on hold.
+    pub step: TimeStep,
+}
+
+/// A spring and a damper at the output shaft, with a torque beside both: the target of a joint of an arm or a leg.
+///
+/// The torque is `stiffness * (angle - measured angle) + damping * (velocity - measured velocity) + torque`, within the limits
+/// of the motor.
+///
+/// # Examples
+/// ```
+/// use drivetrain::motor::Impedance;
+/// use drivetrain::units::Angle;
+///
+/// let hold = Impedance { angle: Angle::from_degrees(30.0), stiffness: 20.0, damping: 0.6, ..Impedance::FREE };
+/// assert!(hold.is_finite() && hold.torque_nm == 0.0);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Impedance {
+    /// The angle where the spring is at rest, in the range of the motor's own angle: turns count.
+    pub angle: Angle,
+    /// The velocity at which the damper is at rest.
+    pub velocity: AngularVelocity,
+    /// The stiffness of the spring in Nm/rad, not negative.
+    pub stiffness: f32,
+    /// The damping in Nm s/rad, not negative.
+    pub damping: f32,
+    /// The torque beside both, in Nm; positive is counter-clockwise: the weight of an arm, say.
+    pub torque_nm: f32,
+}
+
+impl Impedance {
+    /// Neither spring nor damper, and no torque.
+    pub const FREE: Self = Self {
+        angle: Angle::ZERO,
+        velocity: AngularVelocity::ZERO,
+        stiffness: 0.0,
+        damping: 0.0,
+        torque_nm: 0.0,
+    };
+
+    /// Returns the largest value of each field of a frame.
+    pub(crate) const fn most(ranges: &Ranges) -> Self {
+        Self::of(ranges, 1.0, 1.0, 1.0)
+    }
+
+    /// Returns the value of a count of each field, for fields up to `top`; the field of the angle goes to 65535.
+    pub(crate) const fn count(ranges: &Ranges, top: u16) -> Self {
+        let top = top as f32;
+        Self::of(ranges, 2.0 / 65_535.0, 2.0 / top, 1.0 / top)
+    }
+
+    const fn of(ranges: &Ranges, angle: f32, signed: f32, gain: f32) -> Self {
+        let (stiffness, damping) = ranges.gains();
+        Self {
+            angle: Angle::from_radians(ranges.position_rad() * angle),
+            velocity: AngularVelocity::from_rad_per_s(ranges.velocity_rad_per_s() * signed),
+            stiffness: stiffness * gain,
+            damping: damping * gain,
+            torque_nm: ranges.torque_nm() * signed,
+        }
+    }
+
+    /// Tells whether each value is finite, and stiffness and damping are not negative.
+    #[must_use]
+    pub const fn is_finite(&self) -> bool {
+        self.angle.is_finite()
+            && self.velocity.is_finite()
+            && self.stiffness.is_finite()
+            && self.damping.is_finite()
+            && self.torque_nm.is_finite()
+            && self.stiffness >= 0.0
+            && self.damping >= 0.0
+    }
+}
+
+impl From<Impedance> for mit::Command {
+    fn from(impedance: Impedance) -> Self {
+        let Impedance { angle, velocity, stiffness, damping, torque_nm } = impedance;
+        Self {
+            position_rad: angle.as_radians(),
+            velocity_rad_per_s: velocity.as_rad_per_s(),
+            kp: stiffness,
+            kd: damping,
+            torque_nm,
+        }
+    }
+}
+
+/// Takes feedback of exactly 8 bytes. If `take` returns `None`, a field has an impossible value, and nothing has changed.
+pub(crate) fn ingest_eight(frame: &CanFrame, take: impl FnOnce(&[u8; 8]) -> Option<()>) -> Ingest {
+    if frame.length() != 8 {
+        return Ingest::Malformed(Malformed::Length(frame.length()));
+    }
+    take(frame.bytes()).map_or(Ingest::Malformed(Malformed::Field), |()| Ingest::Taken)
 }

@@ -1,8 +1,8 @@
 //! Rules shared by the motors of a device: time, the request to arm, the emergency stop.
 
+use super::LONGEST_PAUSE_US;
 use super::gesture::Gesture;
 use super::motor::{Known, MotorGuard};
-use super::stamp::LONGEST_PAUSE_US;
 use crate::motor::{ArmError, Journal, Link, Timeouts};
 use crate::time::{Duration, Instant};
 
@@ -272,7 +272,7 @@ pub(crate) struct Ages {
 
 impl Ages {
     /// Returns the ages of no motor. A new target may come at any time from now on.
-    pub(super) const fn none(now: u32, timeouts: &Timeouts) -> Self {
+    pub(in crate::motor) const fn none(now: u32, timeouts: &Timeouts) -> Self {
         let (late_us, command_us) = (timeouts.late_us(), timeouts.command_us());
         Self { now, late_us, command_us, heard: 0, commanded: command_us }
     }

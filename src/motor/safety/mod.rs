@@ -39,18 +39,66 @@
 
 mod device;
 mod gesture;
-mod guard;
 mod motor;
-mod stamp;
-mod state;
 
-use crate::time::Duration;
+use crate::time::{Duration, Instant};
 
 pub(crate) use device::{Ages, DeviceGuard, Hold, LONGEST_PAUSE};
-pub use guard::Guard;
 pub(crate) use motor::MotorGuard;
-pub(crate) use stamp::{age, take_age};
-pub(crate) use state::Rest;
 
 /// Default time in which the output range of a motor opens after arming: 0.2 s.
 pub const OPENING: Duration = Duration::from_millis(200);
+
+/// Whether a motor takes targets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Arming {
+    Disarmed,
+    Armed,
+    /// Relaxed since arming, because the feedback was lost.
+    Latched,
+    /// Relaxed since arming, for another reason.
+    Tripped,
+}
+
+/// Rest of a motor since the last run of its loops.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Rest {
+    /// No rest.
+    None,
+    /// The feedback was late: older measurements give no rate.
+    Pause,
+    /// There was no target: the loops start afresh.
+    Relaxed,
+}
+
+/// Longest pause between two checks for which a 32-bit stamp still represents an age.
+const LONGEST_PAUSE_US: u32 = 60_000_000;
+
+/// Tells whether a stamp lies within `limit` of `now`, before or after.
+///
+/// A stamp may lie after `now`, because an interrupt may stamp a frame just after a tick has read the clock. The limit holds there too:
+/// after a set-back of the clock, an old stamp must not look fresh.
+#[inline]
+const fn is_near(now: u32, stamp: u32, limit: u32) -> bool {
+    now.wrapping_sub(stamp).wrapping_add(limit) <= limit.wrapping_mul(2)
+}
+
+/// Returns the age of a stamp; zero for a stamp ahead.
+pub(crate) const fn age(now: u32, stamp: u32) -> u32 {
+    let age = now.wrapping_sub(stamp);
+    if age.cast_signed() < 0 { 0 } else { age }
+}
+
+/// Returns the age of a stamp, which is brought to `now` if the clock went back behind it.
+pub(crate) fn take_age(now: Instant, stamp: &mut u32) -> Duration {
+    let micros = age(now.stamp(), *stamp);
+    *stamp = now.stamp().wrapping_sub(micros);
+    Duration::from_micros(micros.into())
+}
+
+/// Returns whole milliseconds, at most 65 s.
+const fn whole_ms(time: Duration) -> u16 {
+    let millis = time.as_micros() / 1_000;
+    #[expect(clippy::cast_possible_truncation, reason = "limited before")]
+    if millis < 65_000 { millis as u16 } else { 65_000 }
+}

@@ -1,7 +1,6 @@
 //! Rules of one motor.
 
-use super::stamp::{LONGEST_PAUSE_US, age, is_near, whole_ms};
-use super::state::{Arming, Rest};
+use super::{Arming, LONGEST_PAUSE_US, Rest, age, is_near, whole_ms};
 use crate::motor::{Condition, Latch, Link, TargetError, Timeouts};
 use crate::time::Duration;
 
@@ -70,7 +69,8 @@ impl MotorGuard {
     };
 
     /// A motor without feedback, which counts as online.
-    pub(super) const DEAF: Self = Self { listens: false, link: Link::Online, ..Self::NEW };
+    pub(in crate::motor) const DEAF: Self =
+        Self { listens: false, link: Link::Online, ..Self::NEW };
 
     /// Sets the time in which the output range opens, at most 65 s, and whether targets are taken again after a recovery.
     pub(crate) const fn with(self, opening: Duration, resumes: bool) -> Self {
@@ -125,12 +125,12 @@ impl MotorGuard {
         &mut self.latch
     }
 
-    pub(super) const fn listens(&self) -> bool {
+    pub(in crate::motor) const fn listens(&self) -> bool {
         self.listens
     }
 
     /// Tells whether the feedback is not fresh.
-    pub(super) fn is_missing(&self, now: u32, timeouts: &Timeouts) -> bool {
+    pub(in crate::motor) fn is_missing(&self, now: u32, timeouts: &Timeouts) -> bool {
         self.listens && !(self.link == Link::Online && self.is_fresh(now, timeouts))
     }
 
@@ -167,7 +167,12 @@ impl MotorGuard {
     /// Notes feedback of a motor that is online, if the previous feedback and the previous update are recent. Otherwise does nothing and
     /// returns `false`.
     #[inline]
-    pub(super) fn hear_soon(&mut self, now: u32, updated: u32, timeouts: &Timeouts) -> bool {
+    pub(in crate::motor) fn hear_soon(
+        &mut self,
+        now: u32,
+        updated: u32,
+        timeouts: &Timeouts,
+    ) -> bool {
         let is_soon = |before| now.wrapping_sub(before) <= timeouts.late_us();
         let is_usual = self.link == Link::Online && is_soon(self.heard) && is_soon(updated);
         if is_usual {

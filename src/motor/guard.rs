@@ -1,7 +1,6 @@
 //! Rules of a motor that is a device by itself.
 
-use super::stamp::age;
-use super::{DeviceGuard, MotorGuard, OPENING};
+use super::safety::{DeviceGuard, MotorGuard, OPENING, age};
 use crate::motor::{
     Condition, Conditions, Edge, Health, Latch, Link, MotorName, TargetError, Timeouts,
 };
@@ -93,7 +92,7 @@ impl Guard {
     }
 
     /// Returns the time since the last feedback in µs; `None` before the first.
-    pub(in crate::motor) fn gap_us(&self, now: Instant) -> Option<u32> {
+    pub(super) fn gap_us(&self, now: Instant) -> Option<u32> {
         let is_heard = self.motor.link() != Link::Unheard;
         is_heard.then(|| age(now.stamp(), self.motor.heard()))
     }
@@ -177,7 +176,7 @@ impl Guard {
     }
 
     /// Closes the output range and opens it from now on: the drive did not follow before.
-    pub(in crate::motor) const fn reopen(&mut self) {
+    pub(super) const fn reopen(&mut self) {
         self.motor.open(self.device.now());
     }
 
@@ -323,11 +322,7 @@ impl Guard {
     }
 
     /// Runs a change of the conditions, and notes its consequences.
-    pub(in crate::motor) fn latch<T>(
-        &mut self,
-        now: Instant,
-        change: impl FnOnce(&mut Latch) -> T,
-    ) -> T {
+    pub(super) fn latch<T>(&mut self, now: Instant, change: impl FnOnce(&mut Latch) -> T) -> T {
         self.change(now, |motor| change(motor.latch_mut()))
     }
 
