@@ -8,8 +8,8 @@ use super::feedback::{endpoint_value, words};
 use super::{Feedback, Firmware, Heartbeat, Motor};
 use crate::frame::CanFrame;
 use crate::motor::{
-    Capabilities, Capability, Claim, Goal, Ingest, Inquiry, MotorName, Order, OwnMotor, Role, Told,
-    Vitals, WrongSetting, code_from, ingest_eight, lowest_bit,
+    Capabilities, Capability, Claim, Goal, Ingest, MotorName, Order, OwnMotor, Role, Told, Vitals,
+    WrongSetting, code_from, ingest_eight, lowest_bit,
 };
 use crate::units::{Angle, AngularVelocity};
 use core::f32::consts::TAU;
@@ -31,6 +31,28 @@ const LIMITS_EACH: u8 = 100;
 
 /// The code of the first bit of the reason of a disarmed drive.
 const DISARMED: u8 = 129;
+
+/// The frames, 10 ms apart, until a drive must have become idle and answered.
+const MOST_FRAMES: u8 = 200;
+
+/// The frames, 10 ms apart, from the request for closed loop until a drive must have followed.
+const PATIENCE: u8 = 51;
+
+/// Error codes beside those of a heartbeat: a drive that does not become idle; and a refused request, with the
+/// procedure result added.
+const NOT_IDLE: u8 = 63;
+const REFUSED: u8 = 64;
+
+/// How far the drive has been enabled.
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
+pub(super) enum Phase {
+    #[default]
+    Off,
+    /// The number of the first frame to the idle drive.
+    Starting(u8),
+    /// The number of the request for closed loop.
+    Requested(u8),
+}
 
 impl OwnMotor for Motor {
     fn name(&self) -> MotorName {
@@ -136,7 +158,12 @@ impl OwnMotor for Motor {
             self.state.clears -= 1;
             return Some(self.send(Command::ClearErrors));
         }
-        let number = if self.state.silence_s > INQUIRY_S { HEARTBEAT } else { ERRORS };
+        let is_silent = self.state.silence_s > INQUIRY_S;
+        if self.settings.has_missed() && !is_silent {
+            let asked = self.settings.inquire().and_then(|asked| endpoint(self.node, asked));
+            return Some(asked.unwrap_or_else(|| self.modes()));
+        }
+        let number = if is_silent { HEARTBEAT } else { ERRORS };
         (self.firmware == Firmware::V0_6).then(|| request(self.node, number))
     }
 
@@ -157,16 +184,20 @@ impl OwnMotor for Motor {
         true
     }
 
-    /// An axis in calibration or in an unknown state is not armed.
+    /// An axis in calibration or in an unknown state is not armed, nor a drive that did not confirm an endpoint.
     fn wrong_setting(&self) -> Option<WrongSetting> {
+        let (name, settings) = (self.name(), &self.settings);
+        let missed = settings.wrong_setting(name, |_, _| true, |(_, _, it)| it, |_| f32::NAN);
         let is_known = matches!(self.axis(), Some(Heartbeat::IDLE | Heartbeat::CLOSED_LOOP));
         let is_wrong = self.state.phase == Phase::Off && !is_known;
         let (expected, found) = (Heartbeat::IDLE.into(), self.axis().map(f32::from));
-        is_wrong.then(|| WrongSetting::new(self.name(), "axis state", expected, found))
+        let of_axis = || WrongSetting::new(name, "axis state", expected, found);
+        missed.or_else(|| is_wrong.then(of_axis))
     }
 
     fn forget_settings(&mut self) {
         self.state.heartbeat.take_if(|_| self.state.phase == Phase::Off);
+        self.settings.forget();
     }
 
     fn frames_per_answer(&self) -> u32 {
@@ -213,32 +244,7 @@ impl Motor {
             Goal::Impedance(_) => Command::Torque(0.0),
         })
     }
-}
 
-/// The frames, 10 ms apart, until a drive must be idle and must have answered all questions.
-const MOST_FRAMES: u8 = 200;
-
-/// The frames, 10 ms apart, from the request for closed loop until a drive must have followed.
-const PATIENCE: u8 = 51;
-
-/// Error codes beside those of a heartbeat: settings not taken by the drive; and a refused request, with the
-/// procedure result added.
-const NOT_SET: u8 = 63;
-const REFUSED: u8 = 64;
-
-/// How far the drive has been enabled.
-#[derive(Debug, Default, Clone, Copy, PartialEq)]
-pub(super) enum Phase {
-    #[default]
-    Off,
-    /// The number of the first frame to the idle drive.
-    Starting(u8),
-    /// The number of the request for closed loop.
-    Requested(u8),
-}
-
-/// Frames of several steps, and their order.
-impl Motor {
     pub(super) fn send(&self, command: Command) -> CanFrame {
         command.frame(self.node)
     }
@@ -275,7 +281,7 @@ impl Motor {
     pub(super) fn starting(&mut self, sent: u8) -> CanFrame {
         let first = match self.state.phase {
             Phase::Requested(first) => return self.requested(sent.saturating_sub(first)),
-            _ if sent >= MOST_FRAMES => return self.refuse(NOT_SET),
+            _ if sent >= MOST_FRAMES => return self.refuse(NOT_IDLE),
             Phase::Starting(first) => first,
             Phase::Off => sent,
         };
@@ -295,15 +301,11 @@ impl Motor {
             self.settings.forget();
             return frame;
         }
-        match self.settings.prepare(0, self.endpoints.into_iter().flatten()) {
-            Some(Inquiry::Write(setting, value)) => endpoint(self.node, setting, Some(value)),
-            Some(Inquiry::Read(setting)) => endpoint(self.node, setting, None),
-            _ => {
-                self.state.phase = Phase::Requested(sent);
-                self.state.limits = Told::ZERO;
-                self.requested(0)
-            }
-        }
+        let asked = self.settings.prepare(sent, self.endpoints.into_iter().flatten());
+        asked.and_then(|asked| endpoint(self.node, asked)).unwrap_or_else(|| {
+            (self.state.phase, self.state.limits) = (Phase::Requested(sent), Told::ZERO);
+            self.requested(0)
+        })
     }
 
     /// Requests closed loop, once, and waits for a heartbeat: a second request would leave closed loop and begin anew. Modes and

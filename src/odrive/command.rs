@@ -2,7 +2,7 @@
 
 use super::config::Endpoint;
 use crate::frame::{CanFrame, standard_id};
-use crate::motor::Form;
+use crate::motor::{Form, Inquiry};
 use embedded_can::{Frame, Id};
 
 /// The number of the heartbeat.
@@ -113,13 +113,16 @@ pub(super) fn request(node: u8, number: u8) -> CanFrame {
 /// byte 0            1 .. 2       3   4 ..
 /// 0 read, 1 write   endpoint     0   value, low byte first
 /// ```
-pub(super) fn endpoint(node: u8, (number, form): Endpoint, value: Option<f32>) -> CanFrame {
+pub(super) fn endpoint(node: u8, asked: Inquiry<Endpoint>) -> Option<CanFrame> {
+    let (number, form, _) = asked.setting()?;
     let ([low, high], id) = (number.to_le_bytes(), id(node, ASK_ENDPOINT));
-    match (value.map(|value| form.bytes_of(value)), form) {
+    let value =
+        if let Inquiry::Write(_, value) = asked { Some(form.bytes_of(value)) } else { None };
+    Some(match (value, form) {
         (None, _) => CanFrame::of(id, [0, low, high, 0]),
         (Some([a, b, c, d]), Form::F32) => CanFrame::of(id, [1, low, high, 0, a, b, c, d]),
         (Some([a, ..]), _) => CanFrame::of(id, [1, low, high, 0, a]),
-    }
+    })
 }
 
 /// Returns the id of a message: `node * 32 + number`.

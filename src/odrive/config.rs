@@ -160,6 +160,7 @@ impl Motor {
 
 /// A control mode of the drive. An [`ImpedanceControl`] is also a mode: torque mode, where the drive follows a torque
 /// computed here for each cycle by gains or loops.
+#[must_use]
 #[derive(Debug, Clone, Copy)]
 pub struct Mode {
     pub(super) control: ControlMode,
@@ -191,28 +192,24 @@ impl Mode {
 
     /// Velocity mode: the drive's own loop follows a velocity, with at most this torque of the output shaft in Nm, above 0: the drive
     /// gets the current limit of this torque.
-    #[must_use]
     pub const fn velocity(torque_limit_nm: f32) -> Self {
         Self::of(ControlMode::velocity(VELOCITY, None, Some(torque_limit_nm)), PASSTHROUGH)
     }
 
     /// Position mode: the drive's own loops go to an angle by the shortest way, with at most this torque of the output shaft in Nm,
     /// above 0. Each target is followed at once, up to the velocity limit of the motor.
-    #[must_use]
     pub const fn position(torque_limit_nm: f32) -> Self {
         Self::of(ControlMode::angle(POSITION, None, Some(torque_limit_nm)), PASSTHROUGH)
     }
 
     /// As [`position`](Self::position), and the drive smooths each target with its second-order filter, whose `input_filter_bandwidth` is
     /// a setting of the drive.
-    #[must_use]
     pub const fn position_with_filter(torque_limit_nm: f32) -> Self {
         Self { input: FILTER, ..Self::position(torque_limit_nm) }
     }
 
     /// As [`position`](Self::position), and the drive plans a trajectory to each target: at most as fast as the velocity limit of the
     /// motor, with this acceleration and deceleration of the output shaft in rad/s², above 0.
-    #[must_use]
     pub const fn position_with_trajectory(torque_limit_nm: f32, acceleration: f32) -> Self {
         let acceleration = Some(acceleration);
         Self { input: TRAJECTORY, acceleration, ..Self::position(torque_limit_nm) }
@@ -232,8 +229,8 @@ impl Mode {
     }
 }
 
-/// Number and form of an endpoint: a setting of the drive.
-pub(super) type Endpoint = (u16, Form);
+/// Number, form and name of an endpoint: a setting of the drive.
+pub(super) type Endpoint = (u16, Form, &'static str);
 
 /// The endpoints to be confirmed before closed loop.
 type Preparations = [Preparation<Endpoint>; 4];
@@ -262,10 +259,13 @@ impl Endpoints {
     /// version are found before anything is written.
     const fn preparations(&self, mode: &Mode, watchdog_s: f32) -> Preparations {
         [
-            Preparation::found((self.control_mode, Form::U8), mode.control.number as f32),
-            Preparation::found((self.input_mode, Form::U8), mode.input as f32),
-            Preparation::exact((self.watchdog_timeout, Form::F32), watchdog_s),
-            Preparation::exact((self.enable_watchdog, Form::U8), 1.0),
+            Preparation::found(
+                (self.control_mode, Form::U8, "control_mode"),
+                mode.control.number as f32,
+            ),
+            Preparation::found((self.input_mode, Form::U8, "input_mode"), mode.input as f32),
+            Preparation::exact((self.watchdog_timeout, Form::F32, "watchdog_timeout"), watchdog_s),
+            Preparation::exact((self.enable_watchdog, Form::U8, "enable_watchdog"), 1.0),
         ]
     }
 }

@@ -139,6 +139,6 @@ pub(super) const fn words(data: &[u8; 8]) -> (u32, u32) {
 /// ```
 pub(super) fn endpoint_value(data: &[u8; 8], length: u8, asked: Inquiry<Endpoint>) -> Option<f32> {
     let [_, low, high, _, value @ ..] = *data;
-    let Inquiry::Read((number, form)) = asked else { return None };
+    let Inquiry::Read((number, form, _)) = asked else { return None };
     (length > 4 && u16::from_le_bytes([low, high]) == number).then(|| form.value_of(value))
 }

@@ -52,7 +52,7 @@
 //! |---|---|
 //! | 1 to 32 | the lowest bit of the axis error, or of the active errors of 0.6 |
 //! | 33, 34, 35 | 0.5.6: the motor, the encoder, the controller has an error, and the axis none |
-//! | 63 | the drive did not take modes or watchdog, did not answer, or did not become idle, within 2 s |
+//! | 63 | the drive did not become idle within 2 s |
 //! | 64 to 127 | closed loop was refused: 64 and the procedure result of 0.6, 78 for one that is not calibrated |
 //! | 129 to 160 | a warning: the bit of the disarm reason of 0.6, from 129 |
 //!

@@ -412,11 +412,15 @@ fn wrong_setting(family: &Family) -> Outcome {
 
 fn with_setting(station: Station) -> String {
     let mut station = station.settled();
-    if let Err(refused) = station.device.arm(station.now()) {
+    let refusal = |station: &mut Station| {
+        let refused = station.device.arm(station.now()).err()?;
         assert!(matches!(refused, ArmError::Setting(_)), "{refused}");
         let refused = refused.to_string();
         let (told, _) = refused.split_once(": ").unwrap();
-        return format!("not armed: {told}");
+        Some(format!("not armed: {told}"))
+    };
+    if let Some(told) = refusal(&mut station) {
+        return told;
     }
     let mut code = 0;
     let mut is_driven = false;
@@ -428,6 +432,7 @@ fn with_setting(station: Station) -> String {
     match (station.device.is_armed(), is_driven) {
         (true, true) => "set up before it is enabled".to_owned(),
         (true, false) => "armed all the same".to_owned(),
+        (false, false) if code == 0 => format!("not driven; {}", refusal(&mut station).unwrap()),
         (false, false) => format!("not driven, code {code}"),
         (false, true) => panic!("driven, code {code}"),
     }

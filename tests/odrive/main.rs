@@ -538,15 +538,17 @@ fn a_drive_that_does_not_take_its_mode_is_never_enabled() {
     let set = motor(mode, Firmware::V0_6).with_endpoints(wrong, Duration::from_millis(50));
     let mut bench = Bench::with(set.unwrap(), GEAR);
     bench.arm();
-    let mut codes = Vec::new();
-    bench.steps(2_500, |bench| {
+    let refusal = |bench: &mut Bench| bench.own.arm(bench.now()).map_err(|error| error.to_string());
+    bench.steps(300, |bench| {
         _ = bench.own.set_velocity((), velocity(5.0));
-        codes.push(bench.own.motor().vitals().error_code);
         assert_eq!(bench.drive.state(), Heartbeat::IDLE);
         assert_eq!(bench.drive.watchdog_s(), None, "nothing is written by numbers that are wrong");
     });
-    assert!(codes.contains(&63) && !Devices::is_armed(&mut bench.own));
-    // One that answers nothing stays idle too.
+    assert!(!Devices::is_armed(&mut bench.own));
+    let told =
+        "D6374 #3 has control_mode 1, the program needs 2: write it, or change the configuration";
+    assert_eq!(refusal(&mut bench), Err(told.to_owned()));
+    // A drive that answers nothing stays idle too, until it has answered.
     let set = motor(mode, Firmware::V0_6).with_endpoints(ENDPOINTS, Duration::from_millis(50));
     let mut bench = Bench::with(set.unwrap(), GEAR);
     bench.arm();
@@ -555,6 +557,16 @@ fn a_drive_that_does_not_take_its_mode_is_never_enabled() {
         _ = bench.own.set_velocity((), velocity(5.0));
         assert_eq!(bench.drive.state(), Heartbeat::IDLE);
     });
+    let told = refusal(&mut bench).unwrap_err();
+    assert!(
+        told.starts_with("D6374 #3 does not report its control_mode, the program needs 2"),
+        "{told}"
+    );
+    bench.lost = None;
+    bench.steps(200, |_| {});
+    assert_eq!(refusal(&mut bench), Ok(()));
+    bench.steps(400, |bench| _ = bench.own.set_velocity((), velocity(5.0)));
+    assert_eq!(bench.drive.state(), Heartbeat::CLOSED_LOOP);
 }
 
 #[test]

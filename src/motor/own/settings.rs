@@ -16,6 +16,16 @@ pub enum Inquiry<R> {
     Store,
 }
 
+impl<R> Inquiry<R> {
+    /// Returns the setting; `None` for all of them.
+    pub(crate) fn setting(self) -> Option<R> {
+        match self {
+            Self::Read(setting) | Self::Write(setting, _) => Some(setting),
+            Self::Store => None,
+        }
+    }
+}
+
 /// The known settings of a drive, and the order of questions about them. `N` settings have to be as configured.
 ///
 /// While the application has a question, each second question is the application's. A read or a write is repeated until the drive
@@ -136,6 +146,7 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
         sent: u8,
         preparations: impl IntoIterator<Item = Preparation<R>>,
     ) -> Option<Inquiry<R>> {
+        self.led_on.take_if(|_| sent == 0);
         let waits = sent.saturating_sub(*self.led_on.get_or_insert(sent)) >= PATIENCE;
         if let Some(setting) = self.unknown() {
             return Some(self.wait_for(setting, None, waits));
@@ -176,10 +187,7 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
 
     /// Returns the question whose answer is awaited, if about this setting.
     pub(crate) fn awaited(&self, setting: R) -> Option<Inquiry<R>> {
-        self.asked.filter(|asked| match asked {
-            Inquiry::Read(awaited) | Inquiry::Write(awaited, _) => *awaited == setting,
-            Inquiry::Store => false,
-        })
+        self.asked.filter(|asked| asked.setting() == Some(setting))
     }
 
     /// Takes a question of the application, in the place of a waiting question.
@@ -219,7 +227,7 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
         if let Some(Missed { setting, written: Some(written), .. }) = self.missed
             && turn.is_multiple_of(2)
         {
-            let is_written = turn.is_multiple_of(4);
+            let is_written = written.is_written && turn.is_multiple_of(4);
             let write = Inquiry::Write(setting, written.value);
             return Some(self.ask(if is_written { write } else { Inquiry::Read(setting) }));
         }
@@ -243,6 +251,11 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
         *self.found.get(place)?
     }
 
+    /// Tells whether the drive did not confirm a setting.
+    pub(crate) const fn has_missed(&self) -> bool {
+        self.missed.is_some()
+    }
+
     /// Returns the question whose answer is awaited.
     #[must_use]
     pub const fn asked(&self) -> Option<Inquiry<R>> {
@@ -260,7 +273,7 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
 
     /// Takes the value in the answer to a question; `false` if the answer is not awaited.
     pub fn take(&mut self, inquiry: Inquiry<R>, value: f32) -> bool {
-        let (Inquiry::Read(setting) | Inquiry::Write(setting, _)) = inquiry else { return false };
+        let Some(setting) = inquiry.setting() else { return false };
         if self.asked != Some(inquiry) {
             return false;
         }
@@ -277,6 +290,9 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
             self.preparing = None;
             self.prepared += u8::from(is_confirmed);
             self.led_on.take_if(|_| is_confirmed);
+            if !is_confirmed && !written.is_written {
+                self.missed = Some(Missed { setting, written: Some(written), found: value });
+            }
         }
         if let Some(missed) = self.missed.as_mut().filter(|it| is_read && it.setting == setting) {
             missed.found = value;

@@ -48,13 +48,13 @@ fn a_request_is_a_remote_frame_of_the_length_of_its_message() {
 /// The example of the documentation of 0.6: `struct.pack('<BHB', ...)` and the value in its own length.
 #[test]
 fn an_endpoint_is_asked_for_and_written_as_in_the_example_of_the_documentation() {
-    assert_eq!(std::format!("{:?}", endpoint(0, (0x1234, Form::U8), None)), "004 [4] 00 34 12 00");
-    let write = endpoint(0, (0x0102, Form::U8), Some(1.0));
-    assert_eq!(std::format!("{write:?}"), "004 [5] 01 02 01 00 01");
-    let write = endpoint(0, (0x0102, Form::F32), Some(0.1));
-    assert_eq!(std::format!("{write:?}"), "004 [8] 01 02 01 00 CD CC CC 3D");
+    let frame = |asked| std::format!("{:?}", endpoint(0, asked).unwrap());
+    let read = |number| Inquiry::Read((number, Form::U8, ""));
+    let write = |form, value| Inquiry::Write((0x0102, form, ""), value);
+    assert_eq!(frame(read(0x1234)), "004 [4] 00 34 12 00");
+    assert_eq!(frame(write(Form::U8, 1.0)), "004 [5] 01 02 01 00 01");
+    assert_eq!(frame(write(Form::F32, 0.1)), "004 [8] 01 02 01 00 CD CC CC 3D");
     let answer = [0, 0x34, 0x12, 0, 1, 0, 0, 0];
-    let read = |number| Inquiry::Read((number, Form::U8));
     assert_eq!(endpoint_value(&answer, 5, read(0x1234)), Some(1.0));
     assert_eq!(endpoint_value(&answer, 4, read(0x1234)), None, "no value");
     assert_eq!(endpoint_value(&answer, 5, read(0x1235)), None, "of another endpoint");
