@@ -106,7 +106,6 @@ impl WordGains {
 
     /// Returns the speed loop with these gains for a motor with the gearbox and the full scale of `config`: A, or V in voltage
     /// mode, per rad/s of the output shaft.
-    #[must_use]
     pub const fn speed_loop<M: Model>(self, config: &Config<M>) -> PidConfig {
         let plain = &config.plain;
         let rpm_per_rad_per_s = 60.0 / TAU;

@@ -73,6 +73,7 @@ pub(super) struct Parameters {
 /// };
 /// # let pid = LOOP;
 /// ```
+#[must_use]
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -96,7 +97,6 @@ impl PidConfig {
     /// Takes the gains: proportional, integral (1/s times the unit of `kp`) and derivative (s times the unit of `kp`).
     ///
     /// Each must be finite and zero or more.
-    #[must_use]
     pub const fn new(kp: f32, ki: f32, kd: f32) -> Self {
         let parameters = Parameters {
             kp,
@@ -126,13 +126,11 @@ impl PidConfig {
     /// Keeps the output in ±`limit`, more than zero. Off by default.
     ///
     /// While the output is at its limit, the integral does not grow in that direction (conditional integration).
-    #[must_use]
     pub const fn with_output_limit(self, limit: f32) -> Self {
         self.with_output_range(-limit, limit)
     }
 
     /// Keeps the output in `lower..=upper`, `lower` below `upper`; otherwise as [`with_output_limit`](Self::with_output_limit).
-    #[must_use]
     pub const fn with_output_range(mut self, lower: f32, upper: f32) -> Self {
         self.parameters.output_lower = lower;
         self.parameters.output_upper = upper;
@@ -140,7 +138,6 @@ impl PidConfig {
     }
 
     /// Keeps the integral term (in units of the output) in ±`limit`, more than zero. Off by default.
-    #[must_use]
     pub const fn with_integral_limit(mut self, limit: f32) -> Self {
         self.integral_limit = limit;
         self
@@ -149,7 +146,6 @@ impl PidConfig {
     /// Lets the integral rest while the error is beyond ±`threshold`, more than zero. Off by default: the integral always works.
     ///
     /// Of this and [`with_variable_integral`](Self::with_variable_integral), the later call counts.
-    #[must_use]
     pub const fn with_integral_separation(mut self, threshold: f32) -> Self {
         self.parameters.full_rate_below = threshold;
         self.parameters.no_rate_above = threshold;
@@ -159,7 +155,6 @@ impl PidConfig {
     /// Integrates at full rate for an error up to `full_below`, not at all from `none_above` on, and in proportion between.
     ///
     /// `full_below` must be zero or more and lie below `none_above`. Off by default.
-    #[must_use]
     pub const fn with_variable_integral(mut self, full_below: f32, none_above: f32) -> Self {
         self.parameters.full_rate_below = full_below;
         let is_step = full_below.to_bits() == none_above.to_bits();
@@ -169,14 +164,12 @@ impl PidConfig {
 
     /// Uses back-calculation instead of conditional integration: the part of the output beyond the limits drains the
     /// integral with the time constant `time_s`, more than zero.
-    #[must_use]
     pub const fn with_back_calculation(mut self, time_s: f32) -> Self {
         self.parameters.drain_time_s = not_off(time_s);
         self
     }
 
     /// Lets the integral grow while the output is at its limit, as far as its own limit.
-    #[must_use]
     pub const fn without_anti_windup(mut self) -> Self {
         self.parameters.drain_time_s = Self::OFF;
         self
@@ -187,7 +180,6 @@ impl PidConfig {
     ///
     /// Inside the band P is zero and the integral moves towards zero only: the integral does not grow, and a wound-up
     /// integral is not frozen either.
-    #[must_use]
     pub const fn with_dead_band(mut self, width: f32) -> Self {
         self.parameters.dead_band = width;
         self
@@ -198,7 +190,6 @@ impl PidConfig {
     /// For speed loops: the effort to overcome dry friction (in units of the output), and the effort for a unit of speed. The
     /// setpoint is taken as `measurement + e`: on a circle, the setpoint next to the measurement, in any turn. A setpoint
     /// removed from the error by rounding counts as zero. A step with a given error has no feed-forward.
-    #[must_use]
     pub const fn with_feed_forward(mut self, static_gain: f32, velocity_gain: f32) -> Self {
         self.static_gain = static_gain;
         self.velocity_gain = velocity_gain;
@@ -210,7 +201,6 @@ impl PidConfig {
     /// The output starts from zero, or from the value given to [`Pid::reset_to`](super::Pid::reset_to). The part cut off counts
     /// as saturation. A change in a step of less than half the spacing of `f32` at the output is lost: 4e-3 a second at an output
     /// of 100 and 1 kHz.
-    #[must_use]
     pub const fn with_slew_limit(mut self, per_s: f32) -> Self {
         self.parameters.slew_per_s = per_s;
         self
@@ -219,14 +209,12 @@ impl PidConfig {
     /// Takes setpoint and measurement as points on a circle of `period` (360.0, 2 pi, 8192.0), more than zero.
     ///
     /// The error and the derivative go by the shortest way. Off by default.
-    #[must_use]
     pub const fn with_period(mut self, period: f32) -> Self {
         self.period = not_off(period);
         self
     }
 
     /// Filters the derivative with a first-order low-pass of this cut-off frequency, more than zero. Off by default.
-    #[must_use]
     pub const fn with_derivative_filter(mut self, cutoff_hz: f32) -> Self {
         self.parameters.derivative_time_s = not_off(1.0 / (core::f32::consts::TAU * cutoff_hz));
         self
@@ -235,7 +223,6 @@ impl PidConfig {
     /// Takes the derivative of the error, so D also responds to changes of the setpoint.
     ///
     /// The default is the derivative of the measurement, without a kick when the setpoint jumps.
-    #[must_use]
     pub const fn with_derivative_on_error(mut self) -> Self {
         self.derivative_on_error = true;
         self
@@ -262,7 +249,6 @@ impl PidConfig {
     /// assert!((pid.output() - 0.96).abs() < 0.01);
     /// # Ok::<(), drivetrain::error::ConfigError>(())
     /// ```
-    #[must_use]
     pub const fn with_tracking(mut self, r: f32) -> Self {
         self.tracking_r = not_off(r);
         self
@@ -287,14 +273,12 @@ impl PidConfig {
     /// assert_eq!(pid.step(1.5, 0.0, &step), 6.0);
     /// # Ok::<(), drivetrain::error::ConfigError>(())
     /// ```
-    #[must_use]
     pub const fn with_incremental_form(mut self) -> Self {
         self.incremental = true;
         self
     }
 
     /// Replaces the three gains.
-    #[must_use]
     pub const fn with_gains(mut self, kp: f32, ki: f32, kd: f32) -> Self {
         self.parameters.kp = kp;
         self.parameters.ki = ki;

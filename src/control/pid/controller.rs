@@ -231,7 +231,6 @@ impl Pid {
     }
 
     /// Returns the configuration.
-    #[must_use]
     pub const fn config(&self) -> PidConfig {
         let tracks = self.core.options & TRACKING != 0;
         PidConfig {

@@ -42,7 +42,6 @@ impl TuningRule {
     /// let speed = TuningRule::ZieglerNicholsPid.pid(10.0, 0.2).with_output_limit(20.0);
     /// assert_eq!(speed.gains(), (6.0, 60.0, 0.15)); // kp, ki, kd
     /// ```
-    #[must_use]
     pub const fn pid(self, ultimate_gain: f32, ultimate_period_s: f32) -> PidConfig {
         let (ku, tu) = (ultimate_gain, ultimate_period_s);
         let (kp, ki, kd) = match self {
