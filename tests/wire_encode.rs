@@ -256,6 +256,20 @@ fn gains_of_a_drive_in_mit_mode_have_their_own_ranges() {
 }
 
 proptest! {
+    /// Law: a torque alone has the bytes of the same command with a gain below a count, which takes the way of all fields.
+    #[test]
+    fn a_torque_alone_is_encoded_as_beside_gains_of_zero_counts(
+        ends in proptest::array::uniform3(1e-3_f32..1e6), share in -1.5_f32..1.5,
+    ) {
+        let [position_rad, velocity_rad_per_s, most_nm] = ends;
+        let ranges = mit::Ranges::new(position_rad, velocity_rad_per_s, most_nm).unwrap();
+        for torque_nm in [share * most_nm, 0.0, most_nm, -most_nm, f32::NAN] {
+            let alone = mit::Command::torque(torque_nm);
+            let beside = mit::Command { kp: 1e-6, ..alone };
+            prop_assert_eq!(ranges.encode(&alone), ranges.encode(&beside));
+        }
+    }
+
     /// Law: what is sent lies at most a count below what is wanted, or at the end of the range.
     #[test]
     fn a_command_in_mit_mode_is_a_count_off_at_most(

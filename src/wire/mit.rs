@@ -82,6 +82,11 @@ impl Command {
     pub const fn torque(torque_nm: f32) -> Self {
         Self { torque_nm, ..Self::REST }
     }
+
+    const fn is_torque(&self) -> bool {
+        let Self { position_rad, velocity_rad_per_s, kp, kd, torque_nm: _ } = self;
+        position_rad.to_bits() | velocity_rad_per_s.to_bits() | kp.to_bits() | kd.to_bits() == 0
+    }
 }
 
 /// Measurements of the drive at the output shaft.
@@ -215,15 +220,21 @@ impl Ranges {
     }
 
     /// Returns the counts of all fields, those of a position of 16 bits.
+    #[inline]
     const fn counts(&self, command: &Command, top: u16) -> [u32; 5] {
-        let (Some(position), Some(velocity), Some(kp), Some(kd), Some(torque)) = (
+        let rest = [TOP_16 as u32 / 2, top as u32 / 2, 0, 0, top as u32 / 2];
+        let Some(torque) = self.torque.counts(command.torque_nm, top) else { return rest };
+        if command.is_torque() {
+            let [position, velocity, kp, kd, _] = rest;
+            return [position, velocity, kp, kd, torque];
+        }
+        let (Some(position), Some(velocity), Some(kp), Some(kd)) = (
             self.position.counts(command.position_rad, TOP_16),
             self.velocity.counts(command.velocity_rad_per_s, top),
             self.kp.counts(command.kp, top),
             self.kd.counts(command.kd, top),
-            self.torque.counts(command.torque_nm, top),
         ) else {
-            return self.counts(&Command::REST, top);
+            return rest;
         };
         [position, velocity, kp, kd, torque]
     }

@@ -101,7 +101,7 @@ impl ImpedanceControl {
 
     /// Returns the command to the drive; `None` to rest: an angle is needed and not known, or the target is not
     /// [accepted](Self::capabilities). `most` is the largest value of each field, and `count` the value of a count of the field, 0 if
-    /// exact. Gains are whole counts and a quarter, for a drive that truncates.
+    /// exact. Gains above zero are whole counts and a quarter, for a drive that truncates.
     pub fn step(
         &mut self,
         order: Order,
@@ -110,17 +110,15 @@ impl ImpedanceControl {
         most: &Impedance,
         count: &Impedance,
     ) -> Option<Impedance> {
-        let gains = (count.stiffness, count.damping);
-        self.step_within(order, (angle, velocity), gains, || (*most, *count))
+        self.step_within(order, (angle, velocity), || (*most, *count))
     }
 
-    /// As [`step`](Self::step), with the counts of the two gains, and all ends and counts, not needed for a torque alone.
+    /// As [`step`](Self::step); ends and counts are not needed for a torque alone.
     #[inline]
     pub(crate) fn step_within(
         &mut self,
         order: Order,
         shaft: Shaft,
-        counts: (f32, f32),
         fields: impl FnOnce() -> (Impedance, Impedance),
     ) -> Option<Impedance> {
         self.effort = 0.0;
@@ -129,9 +127,7 @@ impl ImpedanceControl {
         let torque_nm = limited(wanted.torque_nm, -limit, limit);
         if wanted.stiffness <= 0.0 && wanted.damping <= 0.0 {
             self.effort = torque_nm / self.torque_limit_nm;
-            let (stiffness, damping) = (0.25 * counts.0, 0.25 * counts.1);
-            let (angle, velocity) = (shaft.0.unwrap_or(Angle::ZERO), shaft.1);
-            return Some(Impedance { angle, velocity, stiffness, damping, torque_nm });
+            return Some(Impedance { torque_nm, ..Impedance::FREE });
         }
         let (most, count) = fields();
         self.spring(&Impedance { torque_nm, ..wanted }, shaft, order.share, &most, &count)
@@ -188,7 +184,7 @@ impl ImpedanceControl {
             damping: UNLIMITED,
             torque_nm: self.torque_limit_nm,
         };
-        self.step_within(order, shaft, (0.0, 0.0), || (most, Impedance::FREE))?;
+        self.step_within(order, shaft, || (most, Impedance::FREE))?;
         let limit = self.torque_limit_nm * order.share;
         Some(limited(self.effort * self.torque_limit_nm, -limit, limit))
     }

@@ -153,10 +153,8 @@ impl ControlMode {
     ) -> Option<Goal> {
         match &mut self.follows {
             Follows::Impedance(control) => {
-                let (stiffness, damping) = ranges.gains();
-                let counts = (stiffness / f32::from(top), damping / f32::from(top));
                 let fields = || (Impedance::most(ranges), Impedance::count(ranges, top));
-                let sent = control.step_within(order, shaft, counts, fields)?;
+                let sent = control.step_within(order, shaft, fields)?;
                 Some(Goal::Impedance(sent.into()))
             }
             _ => self.own_goal(order, shaft),
