@@ -87,7 +87,7 @@ DEFECTS = [
     ("controllers", "a reset keeps the integral", "src/control/pid/error_pid.rs",
      "self.interrupt();\n        self.integral = 0.0;\n        self.output = 0.0;",
      "self.interrupt();\n        self.output = 0.0;"),
-    ("controllers", "the slew limiter rounds back", "src/control/shaping/slew.rs",
+    ("controllers", "the slew limiter rounds back", "src/control/shaping/mod.rs",
      "let value = limited(self.value + change, nearest, farthest);", "let value = if nearest > farthest { target } else { self.value + change };"),
     ("chassis", "commands never grow old", "src/chassis/base.rs",
      "self.clock.is_dead() || self.command_age_s > self.limits.command_timeout_s();", "self.clock.is_dead();"),

@@ -121,6 +121,7 @@ fn text(file: &str) -> String {
 
 /// The documentation above the item of a name, which has to be the only one of its file.
 fn documentation(source: &str, name: &str) -> Vec<String> {
+    let (owner, name) = name.split_once("::").unwrap_or(("", name));
     let lines: Vec<&str> = source.lines().map(str::trim).collect();
     let is_item = |line: &str| {
         ["pub fn ", "pub const fn ", "pub struct "].iter().any(|start| {
@@ -129,7 +130,15 @@ fn documentation(source: &str, name: &str) -> Vec<String> {
                 .is_some_and(|rest| !rest.starts_with(|c: char| c.is_alphanumeric() || c == '_'))
         })
     };
-    let items: Vec<usize> = (0..lines.len()).filter(|number| is_item(lines[*number])).collect();
+    // Of several functions of one name, that of a type: `Bus::ingest`.
+    let is_of = |number: usize, owner: &str| {
+        let head = source.lines().take(number + 1).filter(|line| line.starts_with("impl")).last();
+        let mut words = head.unwrap_or_default().split(|c: char| !c.is_alphanumeric());
+        owner.is_empty() || words.any(|word| word == owner)
+    };
+    let items: Vec<usize> = (0..lines.len())
+        .filter(|number| is_item(lines[*number]) && is_of(*number, owner))
+        .collect();
     assert_eq!(items.len(), 1, "items of the name {name}");
     let above = lines[..items[0]].iter().rev();
     above

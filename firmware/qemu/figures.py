@@ -222,12 +222,17 @@ def quote():
 
 
 def price(place, row):
-    """Writes the line with the price into the documentation of a function or a type: `src/dji/bus.rs ingest`."""
+    """Writes the line with the price into the documentation of a function or a type: `src/dji/bus.rs ingest`, or with its type, `Bus::ingest`."""
     file, name, *case = place.split(" ", 2)
+    *owner, name = name.split("::")
     path = ROOT / file
     lines = path.read_text().split("\n")
     item = re.compile(rf"\s*pub (?:const )?(?:fn|struct) {name}\b")
-    found = [number for number, line in enumerate(lines) if item.match(line)]
+    found, head = [], ""
+    for number, line in enumerate(lines):
+        head = line if line.startswith("impl") else head
+        if item.match(line) and all(re.search(rf"\b{word}\b", head) for word in owner):
+            found.append(number)
     if len(found) != 1:
         image.fail(f"{file} has {len(found)} items of the name {name}")
     (end,) = found

@@ -1,6 +1,6 @@
 //! Small matrices as arrays of rows.
 
-use super::wide::Wide;
+use super::number::Wide;
 use crate::error::ConfigError;
 use core::ops::{Add, Div, Mul, Sub};
 

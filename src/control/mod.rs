@@ -58,7 +58,6 @@ mod pid;
 mod shaping;
 pub mod state_space;
 mod tuning;
-mod wide;
 
 pub use actuator::{Cascade, PositionActuator, SpeedActuator};
 pub use differentiator::{Differentiator, fhan};

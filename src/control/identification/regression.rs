@@ -1,8 +1,7 @@
 //! The least squares of a run: sums of products, and their solution for each delay.
 
 use crate::control::matrix::dot;
-use crate::control::number::Sum;
-use crate::control::wide::Wide;
+use crate::control::number::{Sum, Wide};
 
 /// A pivot below this share of its own entry leaves a direction undetermined.
 const LEAST_PIVOT: f32 = 1e-4;

@@ -1,7 +1,5 @@
-use crate::control::motion::roots::{lesser, reach, root};
 use crate::control::motion::task::Task;
-use crate::control::number::limited;
-use crate::control::wide::Wide;
+use crate::control::number::{Wide, lesser, limited, reach, root};
 use crate::math;
 
 /// In `f32`, where rounding may keep the steps from becoming close; then with the value in twice its precision, which takes one step,

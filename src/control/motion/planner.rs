@@ -1,12 +1,9 @@
 use crate::control::error::{finite, positive};
 use crate::control::motion::ascent::{Ascent, Beginning, Curve};
-use crate::control::motion::brake::Brake;
-use crate::control::motion::plan::{Motion, MotionTarget, Phases};
-use crate::control::motion::scale::{self, Limits};
-use crate::control::motion::task::Task;
-use crate::control::number::{self, limited};
+use crate::control::motion::task::{self, Brake, Limits, Task};
+use crate::control::motion::{Motion, MotionTarget, Phases};
+use crate::control::number::{self, Wide, limited};
 use crate::control::shaping::{MotionLimits, ProfileState};
-use crate::control::wide::Wide;
 use crate::error::ConfigError;
 
 /// A task after braking, and the way back to units of the position and seconds.
@@ -53,7 +50,7 @@ impl Planner {
         } else {
             Wide::of(number::finite(end.position - from.position))
         };
-        let (task, limits) = scale::scaled(distance, from, &end, limits);
+        let (task, limits) = task::scaled(distance, from, &end, limits);
         let brake = Brake::of(&task);
         let size = from.position.abs() + end.position.abs();
         let rate = limits.jerk / limits.acceleration;

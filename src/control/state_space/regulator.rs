@@ -1,8 +1,10 @@
-use super::riccati;
-use super::system::LinearSystem;
-use crate::control::error::positive;
-use crate::control::matrix::{apply, finite, is_finite, narrow};
-use crate::control::number::{self, limited};
+use super::{LinearSystem, riccati};
+use crate::control::error::{self, positive};
+use crate::control::matrix::{
+    Grid, apply, finite, identity, is_finite, largest, narrow, paired, solved, times, transposed,
+    wide,
+};
+use crate::control::number::{self, Wide, limited};
 use crate::error::ConfigError;
 
 /// Holds a plant at a reference with the least cost of errors and effort: a linear-quadratic regulator of `N` states, `M` inputs.
@@ -120,4 +122,141 @@ impl<const N: usize, const M: usize> LinearQuadraticRegulator<N, M> {
     pub const fn rejected(&self) -> u16 {
         self.rejected
     }
+}
+
+/// Gains of `N` states and `M` inputs over one parameter, from a table of `K` rows: a gain schedule.
+///
+/// Between two rows the gains are interpolated linearly; beyond the ends they are those of the ends. A loop whose gain stabilises the
+/// plant at each row is not by that stable between them: choose rows so near that neighbours have like gains, and test between.
+///
+/// # Examples
+/// The leg of a balancing robot changes its length: 0.1 to 0.3 m.
+/// ```
+/// use drivetrain::control::state_space::{GainSchedule, LinearQuadraticRegulator};
+///
+/// let legs = GainSchedule::new([(0.1, [[10.0, 1.0]]), (0.2, [[14.0, 1.5]]), (0.3, [[20.0, 2.5]])])?;
+/// assert_eq!(legs.gain(0.15), Some([[12.0, 1.25]]));
+/// assert_eq!(legs.gain(1.0), Some([[20.0, 2.5]]));
+///
+/// let mut balance = LinearQuadraticRegulator::from_gain(&[[10.0, 1.0]])?;
+/// if let Some(gain) = legs.gain(0.25) {
+///     balance.set_gain(&gain);
+/// }
+/// assert_eq!(balance.step(&[0.0, 0.0], &[0.1, 0.0]), [-1.7]);
+/// # Ok::<(), drivetrain::error::ConfigError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct GainSchedule<const N: usize, const M: usize, const K: usize> {
+    table: [(f32, [[f32; N]; M]); K],
+}
+
+impl<const N: usize, const M: usize, const K: usize> GainSchedule<N, M, K> {
+    /// Takes the rows: parameter and gain, by rising parameter.
+    ///
+    /// # Errors
+    /// Names `parameter` or `gain` when one is NaN or infinite; [`ConfigError::Reversed`] with `parameter` when it does not rise;
+    /// [`ConfigError::Unusable`] with `table` when there is no row.
+    pub fn new(table: [(f32, [[f32; N]; M]); K]) -> Result<Self, ConfigError> {
+        if table.is_empty() {
+            return Err(ConfigError::Unusable("table"));
+        }
+        for (parameter, gain) in &table {
+            error::finite("parameter", *parameter)?;
+            finite("gain", gain)?;
+        }
+        if table.iter().zip(table.iter().skip(1)).any(|(row, next)| row.0 >= next.0) {
+            return Err(ConfigError::Reversed("parameter"));
+        }
+        Ok(Self { table })
+    }
+
+    /// Returns the gain at a value of the parameter; `None` if that is NaN.
+    #[must_use]
+    pub fn gain(&self, parameter: f32) -> Option<[[f32; N]; M]> {
+        let mut below = None;
+        for (at, gain) in &self.table {
+            if parameter <= *at {
+                let Some((before, lower)) = below else { return Some(*gain) };
+                // Halves, so that a table over the whole of f32 has no infinite width.
+                let share = (0.5 * parameter - 0.5 * before) / (0.5 * at - 0.5 * before);
+                return Some(paired(&lower, gain, |lower, upper| {
+                    (1.0 - share) * lower + share * upper
+                }));
+            }
+            below = Some((*at, *gain));
+        }
+        below.map(|(_, gain)| gain).filter(|_| !parameter.is_nan())
+    }
+}
+
+/// Returns the inputs that bring a plant from one reference to the next: feed-forward by inversion of the plant.
+///
+/// ```text
+/// u = B⁺ (next - A reference)      B⁺ = (Bᵀ B)⁻¹ Bᵀ
+/// ```
+/// A reference that the plant can follow is followed exactly. Of another one, the states are approached with the least sum of squares, in the
+/// units of the states. Added to the output of a [`LinearQuadraticRegulator`](super::LinearQuadraticRegulator), it leaves only the errors to the
+/// regulator.
+///
+/// # Examples
+/// ```
+/// use drivetrain::control::state_space::{LinearSystem, PlantInversion};
+///
+/// let cart = LinearSystem::discretized(&[[0.0, 1.0], [0.0, 0.0]], &[[0.0], [0.5]], 0.01)?;
+/// let inversion = PlantInversion::new(&cart)?;
+/// let effort = inversion.effort(&[0.0, 1.0], &[0.010_05, 1.01]); // 1 m/s², a mass of 2 kg
+/// assert!((effort[0] - 2.0).abs() < 1e-3);
+/// # Ok::<(), drivetrain::error::ConfigError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct PlantInversion<const N: usize, const M: usize> {
+    a: [[f32; N]; N],
+    inverse: [[f32; N]; M],
+}
+
+/// Least pivot of `BᵀB` with columns of length 1.
+const LEAST: f32 = 1e-9;
+
+impl<const N: usize, const M: usize> PlantInversion<N, M> {
+    /// Inverts a plant.
+    ///
+    /// # Errors
+    /// [`ConfigError::Singular`] with `b`: an input moves no state, or several move the states in the same way, within 3 in 100 000.
+    pub fn new(plant: &LinearSystem<N, M>) -> Result<Self, ConfigError> {
+        let inverse = inverse(plant.b()).ok_or(ConfigError::Singular("b"))?;
+        Ok(Self { a: *plant.a(), inverse })
+    }
+
+    /// Returns the inputs for one time step, from the reference now and that of the next step. A result that is NaN or infinite is
+    /// zero or the largest number of its sign.
+    #[must_use]
+    pub fn effort(&self, reference: &[f32; N], next: &[f32; N]) -> [f32; M] {
+        let mut change = *next;
+        for (change, alone) in change.iter_mut().zip(apply(&self.a, reference)) {
+            *change -= alone;
+        }
+        apply(&self.inverse, &change).map(number::finite)
+    }
+}
+
+fn inverse<const N: usize, const M: usize>(b: &Grid<f32, N, M>) -> Option<Grid<f32, M, N>> {
+    // Each input in a unit in which its largest effect is 1.
+    let mut columns = transposed(&wide(b));
+    let mut sizes = [0.0; M];
+    for (column, size) in columns.iter_mut().zip(&mut sizes) {
+        *size = largest(&[*column]);
+        let scale = Wide::reciprocal(*size);
+        *column = column.map(|entry| entry * scale);
+    }
+    let unit = solved(&times(&columns, &transposed(&columns)), &identity())?;
+    // The inverse of a matrix that is nearly singular is large.
+    let is_regular = largest(&unit) < 1.0 / LEAST;
+    let mut result = times(&unit, &columns);
+    for (row, size) in result.iter_mut().zip(sizes) {
+        let scale = Wide::reciprocal(size);
+        *row = row.map(|entry| entry * scale);
+    }
+    narrow(&result).filter(|_| is_regular)
 }

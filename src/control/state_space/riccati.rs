@@ -1,9 +1,9 @@
-use super::system::LinearSystem;
+use super::LinearSystem;
 use crate::control::matrix::{
     Grid, Number, difference, finite, is_finite, largest, not_negative, positive, row_sum, solved,
     sum, symmetric, times, times_transposed, transposed, wide, with_diagonal,
 };
-use crate::control::wide::Wide;
+use crate::control::number::Wide;
 use crate::error::ConfigError;
 
 /// Each doubling squares the closed loop: 32 are 4·10^9 steps, in which a pole of 1 - 10^-8 decays.
