@@ -49,30 +49,45 @@
 //! let sum = Twist::<Body>::new(1.0, 0.0, 0.0) + Twist::<World>::new(1.0, 0.0, 0.0);
 //! ```
 
-mod arc;
-mod attitude;
-mod error;
 #[cfg(feature = "mint")]
 mod foreign;
-mod frame;
-mod point;
-mod pose;
 mod rotation2;
 mod rotation3;
-#[cfg(feature = "serde")]
-mod stored;
 mod transform2;
 mod transform3;
 mod twist;
 mod vector;
 
-pub use attitude::{Attitude, AttitudeSource};
-pub use frame::{Body, Gimbal, World};
-pub use point::{Point2, Point3};
-pub use pose::Pose2;
 pub use rotation2::{Heading, Rotation2};
-pub use rotation3::Rotation3;
-pub use transform2::Transform2;
+pub use rotation3::{Attitude, AttitudeSource, Rotation3};
+pub use transform2::{Pose2, Transform2};
 pub use transform3::Transform3;
 pub use twist::Twist;
-pub use vector::{Vec2, Vec3};
+pub use vector::{Point2, Point3, Vec2, Vec3};
+
+/// The frame of the chassis: x forward, y left, origin at the origin of the kinematics (the centre of the wheels).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Body {}
+
+/// The frame of the floor: fixed, with its origin and x axis where the heading was zeroed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum World {}
+
+/// The frame of the driver's view: x in the direction of the gimbal, turned against the chassis by its yaw.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Gimbal {}
+
+/// How far lengths and right angles of a matrix from outside may be off.
+const TOLERANCE: f32 = 1e-3;
+
+/// A unit vector may be this far off in its squared length and still be taken bit by bit: rounding of `f32`.
+#[cfg(feature = "serde")]
+const ROUNDING: f32 = 1e-6;
+
+#[cfg(feature = "serde")]
+fn is_unit(square: f32) -> bool {
+    (square - 1.0).abs() <= ROUNDING
+}

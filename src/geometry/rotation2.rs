@@ -1,4 +1,8 @@
 use super::Vec2;
+#[cfg(feature = "serde")]
+use super::{Rotation3, is_unit};
+#[cfg(feature = "serde")]
+use crate::error::ConfigError;
 use crate::math::{atan2, sin_cos};
 use crate::units::Angle;
 
@@ -20,7 +24,7 @@ use crate::units::Angle;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(try_from = "super::stored::StoredRotation2"))]
+#[cfg_attr(feature = "serde", serde(try_from = "StoredRotation2"))]
 pub struct Rotation2 {
     cos: f32,
     sin: f32,
@@ -186,5 +190,30 @@ impl Default for Heading {
 impl Default for Rotation2 {
     fn default() -> Self {
         Self::IDENTITY
+    }
+}
+
+/// The form in a file; reading checks it, or brings it into form.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+#[serde(rename = "Rotation2")]
+struct StoredRotation2 {
+    cos: f32,
+    sin: f32,
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<StoredRotation2> for Rotation2 {
+    type Error = ConfigError;
+
+    /// Takes a vector of any length but zero.
+    fn try_from(StoredRotation2 { cos, sin }: StoredRotation2) -> Result<Self, ConfigError> {
+        let vector = Vec2::new(cos, sin);
+        if is_unit(vector.dot(vector)) {
+            return Ok(Self::from_parts(cos, sin));
+        }
+        // The turn about z is a turn in space.
+        let [w, _, _, z] = Rotation3::from_quaternion(cos, 0.0, 0.0, sin)?.to_quaternion();
+        Ok(Self::from_parts(w, z))
     }
 }

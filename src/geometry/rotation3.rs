@@ -1,9 +1,11 @@
-use super::Vec3;
-use super::error::TOLERANCE;
+#[cfg(feature = "serde")]
+use super::is_unit;
 use super::rotation2::angle_of;
+use super::{Heading, TOLERANCE, Vec3};
 use crate::error::ConfigError;
 use crate::math::{sin_cos, sqrt};
-use crate::units::Angle;
+use crate::time::Instant;
+use crate::units::{Angle, AngularVelocity};
 
 /// A turn in space, kept as a unit quaternion; every composition brings its length back to 1, and so does reading with
 /// `serde`, which refuses a quaternion without a length. After 10^6 compositions the length is right to 2e-7, the angle to
@@ -21,7 +23,7 @@ use crate::units::Angle;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(try_from = "super::stored::StoredRotation3"))]
+#[cfg_attr(feature = "serde", serde(try_from = "StoredRotation3"))]
 pub struct Rotation3 {
     w: f32,
     vector: Vec3,
@@ -202,7 +204,7 @@ impl Rotation3 {
     }
 
     #[cfg(feature = "serde")]
-    pub(super) const fn from_parts(w: f32, vector: Vec3) -> Self {
+    const fn from_parts(w: f32, vector: Vec3) -> Self {
         Self { w, vector }
     }
 
@@ -232,6 +234,76 @@ impl Rotation3 {
 impl Default for Rotation3 {
     fn default() -> Self {
         Self::IDENTITY
+    }
+}
+
+/// Orientation of a body, and how fast it turns.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Attitude {
+    /// Turns the axes of the body into those of the world, z up.
+    pub rotation: Rotation3,
+    /// Angular velocity around x, y and z of the body; counter-clockwise is positive.
+    pub rates: [AngularVelocity; 3],
+}
+
+/// A source of attitude: an IMU that computes it itself, or a chip on the board with a filter.
+///
+/// A robot that is generic over this trait drives with either. `wire::Receiver<hipnuc::Imu, N>` implements it; for a BMI088 on the board
+/// see the package `recipes/imu` of the repository.
+///
+/// # Examples
+/// ```
+/// use drivetrain::geometry::{Attitude, AttitudeSource, Rotation3};
+/// use drivetrain::time::{Duration, Instant};
+/// use drivetrain::units::{Angle, AngularVelocity};
+///
+/// /// The last attitude of a filter, and when it was computed.
+/// struct Filter(Attitude, Instant);
+///
+/// impl AttitudeSource for Filter {
+///     fn attitude(&self, now: Instant) -> Option<Attitude> {
+///         (now.since(self.1) <= Duration::from_millis(20)).then_some(self.0)
+///     }
+/// }
+///
+/// let rotation = Rotation3::from_roll_pitch_yaw(Angle::ZERO, Angle::ZERO, Angle::from_degrees(30.0));
+/// let filter = Filter(Attitude { rotation, rates: [AngularVelocity::ZERO; 3] }, Instant::START);
+/// let heading = filter.heading(Instant::START).map(|heading| heading.angle().as_degrees());
+/// assert!(heading.is_some_and(|degrees| (degrees - 30.0).abs() < 1e-3));
+/// assert_eq!(filter.attitude(Instant::from_micros(20_001)), None); // too old
+/// ```
+pub trait AttitudeSource {
+    /// Returns the attitude at `now`; `None` when the source was silent for longer than its limit, or cannot be trusted.
+    fn attitude(&self, now: Instant) -> Option<Attitude>;
+
+    /// Returns the yaw of the attitude: where x of the body points on the floor, counter-clockwise.
+    fn heading(&self, now: Instant) -> Option<Heading> {
+        let [_, _, yaw] = self.attitude(now)?.rotation.roll_pitch_yaw();
+        Some(Heading::new(yaw))
+    }
+}
+
+/// The form in a file; reading checks it, or brings it into form.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+#[serde(rename = "Rotation3")]
+struct StoredRotation3 {
+    w: f32,
+    vector: Vec3,
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<StoredRotation3> for Rotation3 {
+    type Error = ConfigError;
+
+    /// Takes a quaternion of any length but zero.
+    fn try_from(StoredRotation3 { w, vector }: StoredRotation3) -> Result<Self, ConfigError> {
+        if is_unit(w * w + vector.dot(vector)) {
+            return Ok(Self::from_parts(w, vector));
+        }
+        Self::from_quaternion(w, vector.x, vector.y, vector.z)
     }
 }
 

@@ -1,6 +1,5 @@
-use super::error::TOLERANCE;
 use super::vector::copy;
-use super::{Point3, Rotation3, Vec3};
+use super::{Point3, Rotation3, TOLERANCE, Vec3};
 use crate::error::ConfigError;
 use core::marker::PhantomData;
 
@@ -45,7 +44,7 @@ use core::marker::PhantomData;
 #[derive(Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = ""))]
-#[cfg_attr(feature = "serde", serde(try_from = "super::stored::StoredTransform3"))]
+#[cfg_attr(feature = "serde", serde(try_from = "StoredTransform3"))]
 pub struct Transform3<From, To> {
     rows: [Vec3; 3],
     translation_m: Vec3,
@@ -68,7 +67,7 @@ impl<From, To> Transform3<From, To> {
     }
 
     #[cfg(feature = "serde")]
-    pub(super) const fn from_parts(rows: [Vec3; 3], translation_m: Vec3) -> Self {
+    const fn from_parts(rows: [Vec3; 3], translation_m: Vec3) -> Self {
         Self { rows, translation_m, frames: PhantomData }
     }
 
@@ -183,6 +182,26 @@ const fn combine(row: Vec3, [a, b, c]: &[Vec3; 3]) -> Vec3 {
 impl<From, To> Default for Transform3<From, To> {
     fn default() -> Self {
         Self::IDENTITY
+    }
+}
+
+/// The form in a file; reading checks it, or brings it into form.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+#[serde(rename = "Transform3")]
+struct StoredTransform3 {
+    rows: [Vec3; 3],
+    translation_m: Vec3,
+}
+
+#[cfg(feature = "serde")]
+impl<From, To> TryFrom<StoredTransform3> for Transform3<From, To> {
+    type Error = ConfigError;
+
+    fn try_from(stored: StoredTransform3) -> Result<Self, ConfigError> {
+        let StoredTransform3 { rows, translation_m } = stored;
+        Rotation3::check_rows(rows)?;
+        Ok(Self::from_parts(rows, translation_m))
     }
 }
 
