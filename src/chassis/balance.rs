@@ -1,5 +1,4 @@
-use super::balance_model::{BalanceModel, GRAVITY};
-use super::leg::{LegEffort, LegState};
+use super::leg::{BalanceModel, GRAVITY, LegEffort, LegState};
 use crate::control::state_space::{GainSchedule, LinearQuadraticRegulator, bryson};
 use crate::error::ConfigError;
 use crate::geometry::Attitude;
@@ -146,9 +145,7 @@ impl Balancer {
         if !(least < largest && largest.is_finite()) {
             return Err(ConfigError::Reversed("lengths_m"));
         }
-        limit_nm
-            .iter()
-            .try_for_each(|limit| super::error::positive(*limit, "limit_nm").map(|_| ()))?;
+        limit_nm.iter().try_for_each(|limit| super::positive(*limit, "limit_nm").map(|_| ()))?;
         let mut gains = [(0.0, [[0.0; 6]; 2]); ROWS];
         let mut motion = [(0.0, [[0.0; 8]]); ROWS];
         let per = 1.0 / (ROWS - 1) as f32;

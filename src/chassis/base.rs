@@ -1,6 +1,7 @@
-use super::clock::DeadClock;
 use super::kinematics::{Fastest, slowed};
-use super::{ChassisLimits, ChassisStatus, Kinematics, Odometry, WheelDrive, WheelSpeed};
+use super::{
+    ChassisLimits, ChassisStatus, DeadClock, Kinematics, Odometry, WheelDrive, WheelSpeed,
+};
 use crate::error::ConfigError;
 use crate::geometry::{Body, Heading, Pose2, Twist, World};
 use crate::time::Tick;

@@ -1,4 +1,4 @@
-use super::clock::DeadClock;
+use super::DeadClock;
 use crate::control::{Pid, PidConfig};
 use crate::error::ConfigError;
 use crate::geometry::{Body, Gimbal, Heading, Twist};

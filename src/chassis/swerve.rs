@@ -1,8 +1,7 @@
-use super::error::positive;
-use super::least_squares::{Normal, Row, fit};
+use super::kinematics::{Normal, Row, fit};
 use super::omni::zip_arrays;
 use super::steering::Steering;
-use super::{Kinematics, SwerveSteering, WheelSpeed};
+use super::{Kinematics, SwerveSteering, WheelSpeed, positive};
 use crate::error::ConfigError;
 use crate::geometry::{Body, Rotation2, Twist, Vec2};
 use crate::math::atan2;
