@@ -1,5 +1,4 @@
-use super::ArmJoint;
-use super::joint::{JointMotion, Load};
+use super::{ArmJoint, JointMotion, Load};
 use crate::error::ConfigError;
 use crate::geometry::Vec3;
 use crate::math::sin_cos;
