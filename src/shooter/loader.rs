@@ -1,4 +1,4 @@
-use super::state::LoaderFeedback;
+use super::LoaderFeedback;
 use crate::encoder::Position;
 use core::f32::consts::TAU;
 
