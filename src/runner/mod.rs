@@ -19,8 +19,6 @@
 //!
 //! Nothing here is needed: a program can call [`Devices`] itself, as the examples `sans_io` and `async_sans_io` do.
 
-mod abort;
-mod edge;
 mod port;
 #[cfg(feature = "queue")]
 mod queue;
@@ -30,13 +28,12 @@ mod stop;
 mod tests;
 mod watch;
 
-pub use abort::{AbortPending, NbAbort};
-pub use edge::BusCondition;
 pub use port::{BlockingTx, Nb, Port};
 #[cfg(feature = "queue")]
 pub use queue::{FrameQueue, FrameReceiver, FrameSender};
 pub use statistics::{ErrorCounts, Statistics};
-pub use stop::EmergencyStop;
+pub use stop::{AbortPending, EmergencyStop, NbAbort};
+pub use watch::BusCondition;
 
 use crate::frame::CanFrame;
 use crate::motor::{ArmError, Ask, Devices};

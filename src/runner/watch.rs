@@ -1,14 +1,14 @@
 //! Supervision of the loop: on time, with a clock that advances, with frames received and sent.
 
-mod unsent;
+mod edge;
 
-use super::edge::BusEdge;
-use super::edge::Edges;
+pub use edge::BusCondition;
+
 use super::statistics::increment;
-use super::{BusCondition, Port, Runner};
+use super::{Port, Runner};
 use crate::motor::Devices;
 use crate::time::{Clock, Duration, Instant, Tick};
-use unsent::{Unsent, WATCHED_FRAMES};
+use edge::{BusEdge, Edges, Unsent, WATCHED_FRAMES};
 
 impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// Reads the clock and returns the step that is due, if any.
