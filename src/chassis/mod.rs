@@ -12,7 +12,7 @@
 //! | [`Swerve`] | an array, as given | steered by the shorter way, at rest the angles are held; X-lock |
 //!
 //! A layout is made once from its dimensions; the constructor refuses an impossible layout with a
-//! [`ConfigError`](crate::error::ConfigError). If there are more wheels than unknowns, `forward` is the least-squares fit, and
+//! [`ConfigError`]. If there are more wheels than unknowns, `forward` is the least-squares fit, and
 //! [`slip_m_s`](Kinematics::slip_m_s) measures the contradiction between the wheels.
 //!
 //! ```text

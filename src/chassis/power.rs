@@ -27,7 +27,7 @@ pub struct WheelLoad {
 ///
 /// With the torque in N m at the same shaft as the speed, `k1` is 1: the mechanical power. `k2` is the heat in the
 /// winding, `k3` the friction and iron loss, `k0` the power of the electronics. Fit the coefficients to the motors in
-/// use, for example by [`PowerFit`](super::PowerFit).
+/// use, for example by [`PowerFit`].
 ///
 /// # Examples
 /// ```

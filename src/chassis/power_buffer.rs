@@ -90,7 +90,7 @@ const CHARGING_SHARE: f32 = 0.1;
 /// nothing is added or taken away.
 ///
 /// The power of the supply has to be the power commanded to the controller: the limit of the referee, or the allowance of
-/// [`PowerBuffer`](super::PowerBuffer) if lower. A burst then takes all of its power from the capacitor, and the buffer is left
+/// [`PowerBuffer`] if lower. A burst then takes all of its power from the capacitor, and the buffer is left
 /// for the error of the controller.
 ///
 /// # Examples

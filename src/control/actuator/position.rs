@@ -247,7 +247,7 @@ impl PositionActuator {
 /// velocity ----------------------------------+
 /// ```
 /// Errors are formed elsewhere: from integers, or on a circle. The measured velocity is the rate of the position loop, so a
-/// positive `kd` damps, and its output limit is the speed limit. A [`PositionActuator`](super::PositionActuator) is this with filters.
+/// positive `kd` damps, and its output limit is the speed limit. A [`PositionActuator`] is this with filters.
 ///
 /// # Edge behaviour
 /// As the [`Pid`], loop by loop: on the first call, the position loop gives P and D, since the rate is given, and the speed

@@ -205,7 +205,7 @@ impl<const N: usize, const M: usize, const P: usize> LuenbergerObserver<N, M, P>
         Ok(Self { plant: *plant, c: *c, gain: wide(gain), estimate: Estimate::ZERO })
     }
 
-    /// Calculates the gain that a [`KalmanFilter`](super::KalmanFilter) of the same arguments has in the steady state, in twice the precision
+    /// Calculates the gain that a [`KalmanFilter`] of the same arguments has in the steady state, in twice the precision
     /// of `f32`: at start, not in the loop.
     ///
     /// # Errors

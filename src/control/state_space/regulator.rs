@@ -101,7 +101,7 @@ impl<const N: usize, const M: usize> LinearQuadraticRegulator<N, M> {
         self.output
     }
 
-    /// Replaces the gain from the next step on, as a [`GainSchedule`](super::GainSchedule) asks for. A gain with an entry that is NaN or
+    /// Replaces the gain from the next step on, as a [`GainSchedule`] asks for. A gain with an entry that is NaN or
     /// infinite is refused: the last one stays, and [`rejected`](Self::rejected) grows.
     pub fn set_gain(&mut self, gain: &[[f32; N]; M]) {
         if is_finite(gain) {
@@ -196,7 +196,7 @@ impl<const N: usize, const M: usize, const K: usize> GainSchedule<N, M, K> {
 /// u = B⁺ (next - A reference)      B⁺ = (Bᵀ B)⁻¹ Bᵀ
 /// ```
 /// A reference that the plant can follow is followed exactly. Of another one, the states are approached with the least sum of squares, in the
-/// units of the states. Added to the output of a [`LinearQuadraticRegulator`](super::LinearQuadraticRegulator), it leaves only the errors to the
+/// units of the states. Added to the output of a [`LinearQuadraticRegulator`], it leaves only the errors to the
 /// regulator.
 ///
 /// # Examples
