@@ -19,36 +19,6 @@ use crate::control::pid::{Pid, PidConfig};
 use crate::error::ConfigError;
 use crate::time::TimeStep;
 
-/// An optional low-pass.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-struct OptionalFilter(Option<LowPass>);
-
-impl OptionalFilter {
-    /// Makes the filter, and names its cut-off in errors as this actuator does.
-    const fn new(name: &'static str, cutoff_hz: f32) -> Result<Self, ConfigError> {
-        match (positive(name, cutoff_hz), LowPass::new(cutoff_hz)) {
-            (Ok(()), Ok(filter)) => Ok(Self(Some(filter))),
-            (Err(error), _) | (_, Err(error)) => Err(error),
-        }
-    }
-
-    /// Filters a finite value, by a time step that is not on hold.
-    const fn pass(&mut self, value: f32, step: &TimeStep) -> f32 {
-        match &mut self.0 {
-            Some(filter) => filter.pass(value, step),
-            None => value,
-        }
-    }
-
-    /// Passes the next value as a first value.
-    const fn reset(&mut self) {
-        if let Some(filter) = &mut self.0 {
-            filter.reset();
-        }
-    }
-}
-
 /// A speed loop with its filters.
 ///
 /// ```text
@@ -236,6 +206,36 @@ impl SpeedActuator {
     #[must_use]
     pub const fn rejected(&self) -> u16 {
         self.pid.rejected()
+    }
+}
+
+/// An optional low-pass.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+struct OptionalFilter(Option<LowPass>);
+
+impl OptionalFilter {
+    /// Makes the filter, and names its cut-off in errors as this actuator does.
+    const fn new(name: &'static str, cutoff_hz: f32) -> Result<Self, ConfigError> {
+        match (positive(name, cutoff_hz), LowPass::new(cutoff_hz)) {
+            (Ok(()), Ok(filter)) => Ok(Self(Some(filter))),
+            (Err(error), _) | (_, Err(error)) => Err(error),
+        }
+    }
+
+    /// Filters a finite value, by a time step that is not on hold.
+    const fn pass(&mut self, value: f32, step: &TimeStep) -> f32 {
+        match &mut self.0 {
+            Some(filter) => filter.pass(value, step),
+            None => value,
+        }
+    }
+
+    /// Passes the next value as a first value.
+    const fn reset(&mut self) {
+        if let Some(filter) = &mut self.0 {
+            filter.reset();
+        }
     }
 }
 
