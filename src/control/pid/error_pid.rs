@@ -1,5 +1,5 @@
+use super::Pid;
 use super::config::{NOT_PLAIN, OF_SETPOINT, Parameters, PidConfig, REST_DERIVATIVE, TRACK_OUTPUT};
-use super::controller::Pid;
 use super::law::{CLOSED, UNKNOWN, gate};
 use crate::control::number::limited;
 use crate::error::ConfigError;

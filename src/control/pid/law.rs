@@ -6,11 +6,11 @@
 //!        └─ step_in_full  every option, unguarded; if a value is not finite, once more with guards
 //! ```
 
+use super::Pid;
 use super::config::{
     BACK_CALCULATION, DERIVATIVE_FILTER, DERIVATIVE_ON_ERROR, FEED_FORWARD, GIVEN, OF_SETPOINT,
     PERIOD, REST_DERIVATIVE, SLEW_LIMIT, TRACK_OUTPUT, TRACKING,
 };
-use super::controller::Pid;
 use super::error_pid::ErrorPid;
 use crate::control::number::{finite, limited};
 use crate::math;
