@@ -1,5 +1,5 @@
-// A link of the README that leads to a page on the web page of the repository, and here to a module.
-#![cfg_attr(doc, doc = "[guide]: guide")]
+// Where the links of the page lead on a documentation site: see `pages`.
+#![cfg_attr(all(doc, not(doctest)), doc = include_str!("../docs/site.txt"))]
 #![doc = include_str!("../README.md")]
 #![no_std]
 #![cfg_attr(docsrs, feature(doc_cfg))]
@@ -7,25 +7,10 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
-/// The examples of the pages in `docs/`, and of the Chinese ones.
-#[cfg(doctest)]
-mod pages {
-    #[doc = include_str!("../README.zh-CN.md")]
-    mod chinese {}
-    #[doc = include_str!("../docs/coming-from.md")]
-    mod coming_from {}
-    #[doc = include_str!("../docs/coming-from.zh-CN.md")]
-    mod coming_from_chinese {}
-    #[doc = include_str!("../docs/gains.md")]
-    mod gains {}
-    #[doc = include_str!("../docs/motors.md")]
-    mod motors {}
-    #[doc = include_str!("../docs/robot.md")]
-    mod robot {}
-}
-
 #[cfg(any(doc, doctest))]
 pub mod guide;
+#[cfg(any(doc, doctest))]
+pub mod pages;
 
 // F0: vocabulary
 pub mod error;

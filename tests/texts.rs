@@ -11,6 +11,7 @@ use drivetrain::motor::{Claim, MotorName, Role};
 use drivetrain::runner::FrameQueue;
 use drivetrain::time::ExtendedCounter;
 use embedded_can::StandardId;
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
@@ -200,22 +201,60 @@ fn each_readme_has_at_most_200_lines() {
     }
 }
 
-/// The addresses of the links of a page, also of its link definitions, without those to other sites and to headings.
-fn links(page: &str) -> Vec<&str> {
-    let inline = page.split("](").skip(1).filter_map(|rest| rest.split([')', '#']).next());
-    let definitions = page.lines().filter(|line| line.starts_with('['));
-    let definitions = definitions.filter_map(|line| line.split_once("]: ")?.1.split('#').next());
-    let addresses = inline.chain(definitions);
-    addresses.filter(|address| !address.is_empty() && !address.contains("://")).collect()
+/// The addresses of the links in the text of a page, without those to other sites and to headings of the page.
+fn inline(page: &str) -> Vec<&str> {
+    let addresses = page.split("](").skip(1).filter_map(|rest| rest.split(')').next());
+    addresses.filter(|address| !address.starts_with('#') && !address.contains("://")).collect()
 }
 
-/// The words in square brackets that stand for a link definition, and the definitions.
-fn references(page: &str) -> (Vec<&str>, Vec<&str>) {
-    let used = page.split("][").skip(1).filter_map(|rest| rest.split(']').next());
-    let definitions = page.lines().filter_map(|line| line.strip_prefix('[')?.split_once("]: "));
-    (used.collect(), definitions.map(|(name, _)| name).collect())
+/// The labels in square brackets that stand for a link definition.
+fn references(page: &str) -> Vec<&str> {
+    let mut is_code = false;
+    let lines = page.lines().filter(|line| {
+        is_code ^= line.starts_with("```");
+        !is_code
+    });
+    let used = lines.flat_map(|line| line.split("][").skip(1));
+    used.filter_map(|rest| rest.split(']').next()).collect()
 }
 
+/// The link definitions of a text: labels and addresses.
+fn definitions(text: &str) -> Vec<(&str, &str)> {
+    text.lines().filter_map(|line| line.strip_prefix('[')?.split_once("]: ")).collect()
+}
+
+/// The id of a heading, on the web page of a repository and on a documentation site.
+fn id(heading: &str) -> String {
+    let signs = heading.trim_start_matches('#').trim().chars();
+    let signs = signs.map(|sign| if sign == ' ' { '-' } else { sign.to_ascii_lowercase() });
+    signs.filter(|sign| sign.is_alphanumeric() || ['-', '_'].contains(sign)).collect()
+}
+
+/// The module of each page, by the rows of the macro that includes it.
+fn modules() -> BTreeMap<String, String> {
+    let whole = [
+        ("README.md", "crate"),
+        ("README.zh-CN.md", "crate::pages::chinese"),
+        ("docs/guide/README.md", "crate::guide"),
+        ("docs/guide/zh-CN/README.md", "crate::guide::chinese"),
+    ];
+    let mut modules: BTreeMap<_, _> =
+        whole.into_iter().map(|(path, module)| (path.to_owned(), module.to_owned())).collect();
+    for name in ["pages", "guide"] {
+        let mut module = format!("crate::{name}");
+        for line in page(&format!("src/{name}.rs")).lines() {
+            if line.starts_with("pub mod chinese") {
+                module += "::chinese";
+            } else if let Some((name, path)) = line.trim().split_once(": \"../") {
+                modules
+                    .insert(path.trim_end_matches("\",").to_owned(), format!("{module}::{name}"));
+            }
+        }
+    }
+    modules
+}
+
+/// On a documentation site, the labels lead to the modules in `docs/site.txt`: a label stands for one address in all pages.
 #[test]
 fn every_link_of_the_pages_leads_to_a_file_and_every_page_is_linked() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -225,33 +264,52 @@ fn every_link_of_the_pages_leads_to_a_file_and_every_page_is_linked() {
     };
     let folders = ["docs", "docs/guide", "docs/guide/zh-CN"];
     let docs = folders.map(|folder| files(folder, ".md")).concat();
-    let pages = docs.iter().cloned();
-    let mut linked = Vec::new();
+    let (site, modules, mut seen) = (page("docs/site.txt"), modules(), BTreeMap::new());
+    let site: BTreeMap<_, _> = definitions(&site).into_iter().collect();
     let top = ["README.md", "README.zh-CN.md", "CONTRIBUTING.md", "DESIGN.md"];
-    for path in top.map(ToOwned::to_owned).into_iter().chain(pages) {
+    for path in top.map(ToOwned::to_owned).into_iter().chain(docs.iter().cloned()) {
         let text = page(&path);
-        for address in links(&text) {
-            let target = root.join(&path).with_file_name(address);
-            assert!(target.exists(), "{path}: {address} is not there");
-            linked.push(target.canonicalize().unwrap());
+        assert_eq!(inline(&text), Vec::<&str>::new(), "{path}: give it a label of docs/site.txt");
+        let (used, defined) = (references(&text), definitions(&text));
+        for name in &used {
+            let is_defined = defined.iter().any(|(label, _)| label == name);
+            assert!(is_defined, "{path}: [{name}] is not defined");
         }
-        if path.contains("guide/") {
-            let (used, defined) = references(&text);
-            assert!(!used.is_empty(), "{path}");
-            for name in used {
-                assert!(defined.contains(&name), "{path}: [{name}] is not defined");
+        for (label, address) in defined {
+            assert!(used.contains(&label), "{path}: [{label}] is not used");
+            let (file, part) = address.split_once('#').unwrap_or((address, ""));
+            let file = root.join(&path).with_file_name(file).canonicalize();
+            let file = file.unwrap_or_else(|_| panic!("{path}: {address} is not there"));
+            if !part.is_empty() {
+                let text = fs::read_to_string(&file).unwrap();
+                let mut headings = text.lines().filter(|line| line.starts_with('#'));
+                assert!(headings.any(|line| id(line) == part), "{path}: {address}");
             }
+            let there = site.get(label).unwrap_or_else(|| panic!("docs/site.txt: no [{label}]"));
+            let name = file.strip_prefix(root.canonicalize().unwrap()).unwrap().to_str().unwrap();
+            if !name.ends_with(".svg") {
+                let module = modules.get(name).unwrap_or_else(|| panic!("no module has {name}"));
+                let site =
+                    if part.is_empty() { module.clone() } else { format!("{module}#{part}") };
+                assert_eq!(*there, site, "docs/site.txt: [{label}]");
+            }
+            let target = (file, part.to_owned());
+            let first = seen.entry(label.to_owned()).or_insert_with(|| target.clone());
+            assert_eq!(*first, target, "{path}: [{label}] leads elsewhere too");
         }
+    }
+    for label in site.keys() {
+        assert!(seen.contains_key(*label), "docs/site.txt: no page has a link [{label}]");
     }
     for path in docs.into_iter().chain(files("docs", ".svg")) {
         let file = root.join(&path).canonicalize().unwrap();
-        assert!(linked.contains(&file), "no page links {path}");
+        let is_linked = seen.values().any(|(linked, _)| *linked == file);
+        assert!(is_linked, "no page links {path}");
     }
-    assert_eq!(
-        links("[a](docs/a.md#part), [b](https://b), [c](#c)\n[d]: d.md#e"),
-        ["docs/a.md", "d.md"]
-    );
-    assert_eq!(references("[a][b], [c](d)\n[b]: e.md"), (vec!["b"], vec!["b"]));
+    assert_eq!(inline("[a](docs/a.md#part), [b](https://b), [c](#c)"), ["docs/a.md#part"]);
+    assert_eq!(references("[a][b], [c](d)\n```\ne[1][2]\n```\n[f][g]"), ["b", "g"]);
+    assert_eq!(definitions("[a]\n[b]: c.md#d"), [("b", "c.md#d")]);
+    assert_eq!(id("## Left out, with the `reasons`"), "left-out-with-the-reasons");
 }
 
 /// The names of a list, each before the first mark.
