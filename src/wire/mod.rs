@@ -55,13 +55,149 @@ pub mod supercap;
 pub mod vofa;
 pub mod vt13;
 
-mod deadline;
 mod deframer;
-mod error;
-mod field;
 mod receiver;
 
-pub use deadline::Silence;
+use core::fmt;
+
 pub use deframer::{Counts, Decode, Deframer, Reject};
-pub use error::EncodeError;
-pub use receiver::Receiver;
+pub use receiver::{Receiver, Silence};
+
+/// Why a frame cannot be written. Nothing useful stands in the buffer.
+///
+/// # Examples
+/// ```
+/// use drivetrain::wire::{EncodeError, feetech};
+///
+/// let error = feetech::ping(feetech::ServoId::ONE, &mut [0; 5]).unwrap_err();
+/// assert_eq!(error, EncodeError::BufferTooSmall { needed: 6, given: 5 });
+/// assert_eq!(error.to_string(), "the frame needs 6 bytes, the buffer has 5");
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum EncodeError {
+    /// The caller's buffer is shorter than the frame.
+    BufferTooSmall {
+        /// The length of the frame in bytes.
+        needed: usize,
+        /// The length of the buffer in bytes.
+        given: usize,
+    },
+    /// The parameters of a servo's instruction are more than its length byte can tell.
+    TooManyParameters {
+        /// The number of parameter bytes asked for; at most 253 fit.
+        parameters: usize,
+    },
+    /// The data is more than the length field of its frame can tell.
+    DataTooLong {
+        /// The length of the data in bytes.
+        given: usize,
+        /// The largest number of bytes in one frame.
+        most: usize,
+    },
+}
+
+impl fmt::Display for EncodeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::BufferTooSmall { needed, given } => {
+                write!(f, "the frame needs {needed} bytes, the buffer has {given}")
+            }
+            Self::TooManyParameters { parameters } => {
+                write!(f, "{parameters} parameter bytes, one frame takes 253: split it")
+            }
+            Self::DataTooLong { given, most } => {
+                write!(f, "{given} data bytes, one frame takes {most}: split them")
+            }
+        }
+    }
+}
+
+impl core::error::Error for EncodeError {}
+
+/// Reads from the front. Every method gives `None` when the bytes are used up.
+#[derive(Debug, Clone, Copy)]
+struct Reader<'a>(&'a [u8]);
+
+impl Reader<'_> {
+    fn take<const K: usize>(&mut self) -> Option<[u8; K]> {
+        let (field, rest) = self.0.split_first_chunk()?;
+        self.0 = rest;
+        Some(*field)
+    }
+
+    fn u8(&mut self) -> Option<u8> {
+        self.take().map(|[byte]| byte)
+    }
+
+    fn u16_le(&mut self) -> Option<u16> {
+        self.take().map(u16::from_le_bytes)
+    }
+
+    fn i16_le(&mut self) -> Option<i16> {
+        self.take().map(i16::from_le_bytes)
+    }
+
+    fn i16_be(&mut self) -> Option<i16> {
+        self.take().map(i16::from_be_bytes)
+    }
+
+    fn i32_le(&mut self) -> Option<i32> {
+        self.take().map(i32::from_le_bytes)
+    }
+
+    fn i32_be(&mut self) -> Option<i32> {
+        self.take().map(i32::from_be_bytes)
+    }
+
+    fn f32_le(&mut self) -> Option<f32> {
+        self.take().map(f32::from_le_bytes)
+    }
+
+    /// Reads `K` fields of one kind.
+    fn array<T: Copy + Default, const K: usize>(
+        &mut self,
+        mut field: impl FnMut(&mut Self) -> Option<T>,
+    ) -> Option<[T; K]> {
+        let mut values = [T::default(); K];
+        for value in &mut values {
+            *value = field(self)?;
+        }
+        Some(values)
+    }
+}
+
+/// Writes from the front, into a slice of sufficient length.
+#[derive(Debug)]
+struct Writer<'a> {
+    out: &'a mut [u8],
+    at: usize,
+}
+
+impl<'a> Writer<'a> {
+    /// Takes exactly `needed` bytes of `out`.
+    fn new(out: &'a mut [u8], needed: usize) -> Result<Self, EncodeError> {
+        let given = out.len();
+        let out = out.get_mut(..needed).ok_or(EncodeError::BufferTooSmall { needed, given })?;
+        Ok(Self { out, at: 0 })
+    }
+
+    fn put(&mut self, bytes: &[u8]) {
+        let place = self.at.checked_add(bytes.len()).and_then(|end| self.out.get_mut(self.at..end));
+        if let Some(place) = place {
+            place.copy_from_slice(bytes);
+            self.at += bytes.len();
+        }
+    }
+
+    /// Returns the bytes written so far.
+    fn written(&self) -> &[u8] {
+        self.out.get(..self.at).unwrap_or(&[])
+    }
+
+    /// Gives the frame back.
+    fn finish(self) -> &'a [u8] {
+        self.out
+    }
+}

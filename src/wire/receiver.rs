@@ -1,5 +1,4 @@
-use super::deadline::Deadline;
-use super::{Counts, Decode, Deframer, Silence};
+use super::{Counts, Decode, Deframer};
 use crate::time::{ConditionEdge, Duration, Instant};
 
 /// A [`Deframer`] that keeps its latest frame, and discards the frame when no new frame came in time.
@@ -99,5 +98,170 @@ impl<F: Decode + Copy, const N: usize> Receiver<F, N> {
     #[must_use]
     pub const fn counts(&self) -> Counts {
         self.decoder.counts()
+    }
+}
+
+/// The condition of a source of data: no data until the deadline, or data not to be trusted.
+///
+/// A source is silent before its first data.
+///
+/// # Examples
+/// ```
+/// use drivetrain::time::{ConditionEdge, Instant};
+/// use drivetrain::wire::Silence;
+///
+/// let edge = ConditionEdge { condition: Silence, began: true, at: Instant::from_micros(101_000) };
+/// assert_eq!(edge.to_string(), "silence began at 101000 us");
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Silence;
+
+impl core::fmt::Display for Silence {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("silence")
+    }
+}
+
+/// Watches an event that repeats within a time limit, and latches each change.
+///
+/// At first, the source is silent. An edge is kept until read. When the source came and went more than once between two
+/// calls of [`edge`](Self::edge), changes that cancel each other are left out; [`losses`](Self::losses) still counts
+/// them all.
+#[derive(Debug, Clone)]
+pub(super) struct Deadline {
+    limit: Duration,
+    met: Instant,
+    live: bool,
+    losses: u32,
+    pending: [Option<ConditionEdge<Silence>>; 2],
+}
+
+impl Deadline {
+    /// Takes the longest silence without a loss.
+    pub(super) const fn new(limit: Duration) -> Self {
+        Self { limit, met: Instant::START, live: false, losses: 0, pending: [None; 2] }
+    }
+
+    /// Notes that data came.
+    pub(super) fn meet(&mut self, now: Instant) {
+        self.expire(now);
+        self.met = now;
+        if !self.live {
+            self.live = true;
+            self.latch(edge(false, now));
+        }
+    }
+
+    /// Notes data that cannot be trusted: lost at once.
+    pub(super) fn revoke(&mut self, now: Instant) {
+        self.expire(now);
+        if self.live {
+            self.lose(now);
+        }
+    }
+
+    /// Returns whether data came within the limit.
+    pub(super) fn is_live(&self, now: Instant) -> bool {
+        self.live && now.since(self.met) <= self.limit
+    }
+
+    /// Returns the oldest unread edge.
+    pub(super) fn edge(&mut self, now: Instant) -> Option<ConditionEdge<Silence>> {
+        self.expire(now);
+        let [first, second] = self.pending;
+        self.pending = [second, None];
+        first
+    }
+
+    /// Returns how often the source was lost. Saturates.
+    pub(super) const fn losses(&self) -> u32 {
+        self.losses
+    }
+
+    fn expire(&mut self, now: Instant) {
+        if self.live && !self.is_live(now) {
+            self.lose(self.met + self.limit);
+        }
+    }
+
+    fn lose(&mut self, at: Instant) {
+        self.live = false;
+        self.losses = self.losses.saturating_add(1);
+        self.latch(edge(true, at));
+    }
+
+    fn latch(&mut self, edge: ConditionEdge<Silence>) {
+        self.pending = match self.pending {
+            [None, _] => [Some(edge), None],
+            [first, None] => [first, Some(edge)],
+            [first, Some(_)] => [first, None],
+        };
+    }
+}
+
+/// Beginning or end of silence.
+const fn edge(began: bool, at: Instant) -> ConditionEdge<Silence> {
+    ConditionEdge { condition: Silence, began, at }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ms(ms: u64) -> Instant {
+        Instant::START + Duration::from_millis(ms)
+    }
+
+    #[test]
+    fn data_counts_until_the_limit_and_both_edges_wait() {
+        let mut host = Deadline::new(Duration::from_millis(100));
+        assert!(!host.is_live(ms(0)));
+        host.meet(ms(5));
+        assert!(host.is_live(ms(105)) && !host.is_live(ms(106)));
+        assert_eq!(host.edge(ms(300)), Some(edge(false, ms(5))));
+        assert_eq!(host.edge(ms(300)), Some(edge(true, ms(105))));
+        assert_eq!(host.edge(ms(300)), None);
+    }
+
+    #[test]
+    fn a_loss_between_two_frames_is_latched_without_a_reading_meanwhile() {
+        let mut deadline = Deadline::new(Duration::from_millis(10));
+        deadline.meet(ms(0));
+        assert_eq!(deadline.edge(ms(0)), Some(edge(false, ms(0))));
+        deadline.meet(ms(50));
+        assert_eq!(deadline.edge(ms(50)), Some(edge(true, ms(10))));
+        assert_eq!(deadline.edge(ms(50)), Some(edge(false, ms(50))));
+        assert_eq!(deadline.edge(ms(50)), None);
+    }
+
+    #[test]
+    fn the_last_edge_always_tells_the_present_state() {
+        let mut deadline = Deadline::new(Duration::from_millis(10));
+        for round in 1..100 {
+            deadline.meet(ms(100 * round));
+            if round % 3 == 0 {
+                deadline.revoke(ms(100 * round + 5));
+            }
+            let now = ms(100 * round + 6);
+            if round % 7 == 0 {
+                let mut last = None;
+                while let Some(edge) = deadline.edge(now) {
+                    assert_ne!(
+                        last.map(is_heard),
+                        Some(is_heard(edge)),
+                        "two equal edges in a row"
+                    );
+                    last = Some(edge);
+                }
+                assert_eq!(last.map(is_heard), Some(deadline.is_live(now)));
+            }
+        }
+        assert_eq!(deadline.losses(), 98 + 1);
+    }
+
+    fn is_heard(edge: ConditionEdge<Silence>) -> bool {
+        !edge.began
     }
 }

@@ -32,8 +32,8 @@
 
 use core::fmt::Write;
 
-use super::field::{Reader, Writer};
 use super::{Decode, EncodeError, Reject};
+use super::{Reader, Writer};
 
 /// The end of a frame: +infinity.
 const TAIL: [u8; 4] = [0x00, 0x00, 0x80, 0x7F];

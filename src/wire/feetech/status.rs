@@ -1,5 +1,6 @@
-use super::checksum;
-use crate::wire::{Decode, Reject};
+use super::{checksum, register};
+use crate::units::Angle;
+use crate::wire::{Decode, Reader, Reject};
 
 /// The largest number of parameters in a [`Status`]: a longer reply is refused by its length.
 pub const MAX_PARAMETERS: usize = 32;
@@ -111,6 +112,122 @@ impl Decode for Status {
     }
 }
 
+/// Position counts in one turn of the shaft.
+pub const COUNTS_PER_TURN: u16 = 4096;
+
+/// Returns a number in the format of the servo: bit 15 is the sign, bits 0 to 14 are the magnitude. -32768 becomes
+/// -32767.
+///
+/// # Examples
+/// ```
+/// use drivetrain::wire::feetech::{from_sign_magnitude, to_sign_magnitude};
+///
+/// assert_eq!(to_sign_magnitude(-1000), 0x83E8);
+/// assert_eq!(from_sign_magnitude(0x83E8), -1000);
+/// assert_eq!(to_sign_magnitude(i16::MIN), 0xFFFF);
+/// ```
+#[must_use]
+pub const fn to_sign_magnitude(value: i16) -> u16 {
+    let magnitude = value.unsigned_abs();
+    let magnitude = if magnitude > 0x7FFF { 0x7FFF } else { magnitude };
+    if value < 0 { magnitude | 0x8000 } else { magnitude }
+}
+
+/// Reads a number in the format of the servo; -0 is 0.
+#[must_use]
+pub const fn from_sign_magnitude(raw: u16) -> i16 {
+    let magnitude = (raw & 0x7FFF).cast_signed();
+    if raw & 0x8000 != 0 { -magnitude } else { magnitude }
+}
+
+/// Where a servo is to go: the seven registers from [`ADDRESS`](Self::ADDRESS) on.
+///
+/// In wheel mode only `speed`, with its sign, and `acceleration` count.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Goal {
+    /// In 100 counts per second²; 0 is the largest.
+    pub acceleration: u8,
+    /// In counts, 4096 a turn.
+    pub position: i16,
+    /// Ignored by servos of the STS series; 0.
+    pub time: u16,
+    /// In counts per second; 0 is the largest in position mode.
+    pub speed: i16,
+}
+
+impl Goal {
+    /// The first register.
+    pub const ADDRESS: u8 = register::ACCELERATION;
+
+    /// Returns the bytes of the registers.
+    #[must_use]
+    pub const fn to_bytes(&self) -> [u8; 7] {
+        let [p0, p1] = to_sign_magnitude(self.position).to_le_bytes();
+        let [t0, t1] = self.time.to_le_bytes();
+        let [s0, s1] = to_sign_magnitude(self.speed).to_le_bytes();
+        [self.acceleration, p0, p1, t0, t1, s0, s1]
+    }
+}
+
+/// Measurements of a servo: the eight registers from [`ADDRESS`](Self::ADDRESS) on.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Present {
+    /// In counts, 4096 a turn.
+    pub position: i16,
+    /// In counts per second.
+    pub speed: i16,
+    /// In 0.1 % of the largest output: -1000 to 1000.
+    pub load: i16,
+    /// In 0.1 V.
+    pub voltage_dv: u8,
+    /// In degrees Celsius.
+    pub temperature_c: u8,
+}
+
+impl Present {
+    /// The first register.
+    pub const ADDRESS: u8 = register::PRESENT_POSITION;
+    /// The number of registers.
+    pub const LENGTH: u8 = 8;
+
+    /// Reads the answer to `read(id, Present::ADDRESS, Present::LENGTH, ..)`; `None` for another length.
+    #[must_use]
+    pub fn from_status(status: &Status) -> Option<Self> {
+        let bytes: [u8; 8] = status.parameters().try_into().ok()?;
+        let mut fields = Reader(&bytes);
+        Some(Self {
+            position: from_sign_magnitude(fields.u16_le()?),
+            speed: from_sign_magnitude(fields.u16_le()?),
+            load: load(fields.u16_le()?),
+            voltage_dv: fields.u8()?,
+            temperature_c: fields.u8()?,
+        })
+    }
+
+    /// Returns the position as an angle.
+    #[must_use]
+    pub const fn angle(&self) -> Angle {
+        Angle::from_counts(self.position as i32, COUNTS_PER_TURN)
+    }
+
+    /// Returns the supply voltage in volts.
+    #[must_use]
+    pub const fn voltage_v(&self) -> f32 {
+        self.voltage_dv as f32 * 0.1
+    }
+}
+
+/// Reads the load. The sources put its sign into bit 10 or into bit 15. The magnitude needs neither, as it is at most
+/// 1000: whichever is set is the sign.
+const fn load(raw: u16) -> i16 {
+    let magnitude = (raw & 0x3FF).cast_signed();
+    if raw & 0x8400 != 0 { -magnitude } else { magnitude }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -143,5 +260,19 @@ mod tests {
         assert_eq!(Status::length(&(), &[0xFF, 0xFF, 254, 34]), None);
         assert_eq!(Status::length(&(), &[0xFF, 0xFF, 253, 35]), None);
         assert_eq!(Status::length(&(), &[0xFF, 0xFF, 253, 1]), None);
+    }
+
+    #[test]
+    fn every_number_survives_sign_and_magnitude() {
+        for value in -32_767..=i16::MAX {
+            assert_eq!(from_sign_magnitude(to_sign_magnitude(value)), value);
+        }
+        assert_eq!(from_sign_magnitude(to_sign_magnitude(i16::MIN)), -32_767);
+        assert_eq!(from_sign_magnitude(0x8000), 0);
+    }
+
+    #[test]
+    fn the_sign_of_the_load_is_read_from_either_bit() {
+        assert_eq!([load(1000), load(0x400 | 1000), load(0x8000 | 1000)], [1000, -1000, -1000]);
     }
 }

@@ -1,6 +1,6 @@
 use super::{JOINTS, check, seal};
-use crate::wire::field::{Reader, Writer};
 use crate::wire::{Decode, EncodeError, Reject};
+use crate::wire::{Reader, Writer};
 
 /// The length of a telemetry frame in bytes: 10.5 ms at 115200 baud, of the 50 ms between two frames.
 pub const TELEMETRY_LENGTH: usize = 121;

@@ -1,6 +1,6 @@
 use super::{BarrelHeat, MAX_FRAME, RefereeMessage};
 use crate::time::{ConditionEdge, Duration, Instant};
-use crate::wire::deadline::Deadline;
+use crate::wire::receiver::Deadline;
 use crate::wire::{Counts, Deframer, Silence};
 
 /// A buffer energy above this is no reading: a public super-capacitor controller (HKUST, 2024) counts no more either.

@@ -1,6 +1,126 @@
-use super::{ServoId, checksum};
-use crate::wire::EncodeError;
-use crate::wire::field::Writer;
+//! Feetech STS and SMS servos (STS3032, ..): many on one half-duplex line, 1 Mbaud by default.
+//!
+//! ```text
+//! instruction  FF FF | id | length | instruction | parameters | checksum
+//! status       FF FF | id | length | error bits  | parameters | checksum
+//! length = parameters + 2        checksum = complement of the sum from id to the last parameter
+//! ```
+//! Numbers have their low byte first (older SCS servos have the high byte first; these are not read here). Signed
+//! numbers are sign and magnitude, not two's complement.
+//!
+//! A servo answers every instruction except to [`ServoId::BROADCAST`]. Status and instruction look the same, so on an
+//! adapter with an echo, discard as many received bytes as were sent before giving the rest to the decoder.
+//!
+//! ```
+//! use drivetrain::wire::{Deframer, feetech::{self, Goal, Present, ServoId, Status, MAX_FRAME}};
+//!
+//! let mut buffer = [0; MAX_FRAME];
+//! let goal = Goal { position: 4095, speed: 2250, acceleration: 50, time: 0 };
+//! feetech::write(ServoId::ONE, Goal::ADDRESS, &goal.to_bytes(), &mut buffer)?;
+//! feetech::read(ServoId::ONE, Present::ADDRESS, Present::LENGTH, &mut buffer)?;
+//!
+//! let mut replies = Deframer::<Status, MAX_FRAME>::new();
+//! let mut received: &[u8] = &[0xFF, 0xFF, 1, 10, 0, 0, 8, 0, 0, 0, 0, 0x79, 0x1E, 0x55];
+//! let status = replies.read(&mut received).ok_or("no status")?;
+//! let present = Present::from_status(&status).ok_or("another length was asked for")?;
+//! assert_eq!((present.position, present.temperature_c), (2048, 30));
+//! assert_eq!(present.angle().as_degrees(), 180.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Source: Feetech protocol manual 191218-0923; registers and signs by the vendor's SDK (`SMS_STS`).
+
+mod status;
+
+use super::{EncodeError, Writer};
+
+pub use status::{
+    COUNTS_PER_TURN, Goal, MAX_FRAME, MAX_PARAMETERS, Present, Status, from_sign_magnitude,
+    to_sign_magnitude,
+};
+
+/// The number of a servo on its line: 0 to 253, or all of them.
+///
+/// # Examples
+/// ```
+/// use drivetrain::wire::feetech::ServoId;
+///
+/// assert_eq!(ServoId::new(7).map(ServoId::as_raw), Some(7));
+/// assert_eq!(ServoId::new(254), None);
+/// assert_eq!(ServoId::BROADCAST.as_raw(), 254);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ServoId(u8);
+
+impl ServoId {
+    /// The number of a servo at delivery.
+    pub const ONE: Self = Self(1);
+    /// All servos; none of them answers.
+    pub const BROADCAST: Self = Self(254);
+
+    /// Takes a number of 0 to 253.
+    #[must_use]
+    pub const fn new(raw: u8) -> Option<Self> {
+        if raw < Self::BROADCAST.0 { Some(Self(raw)) } else { None }
+    }
+
+    /// Returns the number: 0 to 254.
+    #[must_use]
+    pub const fn as_raw(self) -> u8 {
+        self.0
+    }
+}
+
+/// Returns the checksum of the bytes from the id to the last parameter.
+fn checksum(bytes: &[u8]) -> u8 {
+    !bytes.iter().fold(0_u8, |sum, byte| sum.wrapping_add(*byte))
+}
+
+pub mod register {
+    //! Addresses of registers, for [`read`](super::read) and [`write`](super::write).
+
+    /// The number on the line, in the EEPROM.
+    pub const ID: u8 = 5;
+    /// 0: 1 Mbaud, 1: 500k, 2: 250k, 3: 128k, 4: 115200, 5: 76800, 6: 57600, 7: 38400.
+    pub const BAUD_RATE: u8 = 6;
+    /// The lowest position, two bytes.
+    pub const MIN_ANGLE: u8 = 9;
+    /// The highest position, two bytes.
+    pub const MAX_ANGLE: u8 = 11;
+    /// Added to the position, two bytes with sign.
+    pub const OFFSET: u8 = 31;
+    /// 0: position, 1: wheel (speed).
+    pub const MODE: u8 = 33;
+    /// 1: torque on, 0: off, 128: take the present position as 2048.
+    pub const TORQUE: u8 = 40;
+    /// In 100 steps per second².
+    pub const ACCELERATION: u8 = 41;
+    /// Two bytes with sign, in counts.
+    pub const GOAL_POSITION: u8 = 42;
+    /// Two bytes.
+    pub const GOAL_TIME: u8 = 44;
+    /// Two bytes with sign, in counts per second.
+    pub const GOAL_SPEED: u8 = 46;
+    /// Two bytes, in 0.1 % of the stall torque.
+    pub const TORQUE_LIMIT: u8 = 48;
+    /// 0: the EEPROM can be written, 1: the EEPROM is locked.
+    pub const LOCK: u8 = 55;
+    /// Two bytes with sign, in counts.
+    pub const PRESENT_POSITION: u8 = 56;
+    /// Two bytes with sign, in counts per second.
+    pub const PRESENT_SPEED: u8 = 58;
+    /// Two bytes with sign, in 0.1 % of the largest output.
+    pub const PRESENT_LOAD: u8 = 60;
+    /// In 0.1 V.
+    pub const PRESENT_VOLTAGE: u8 = 62;
+    /// In degrees Celsius.
+    pub const PRESENT_TEMPERATURE: u8 = 63;
+    /// 1 while the servo moves.
+    pub const MOVING: u8 = 66;
+    /// Two bytes with sign, in 6.5 mA.
+    pub const PRESENT_CURRENT: u8 = 69;
+}
 
 const PING: u8 = 0x01;
 const READ: u8 = 0x02;
