@@ -1,11 +1,11 @@
+use super::can::{Mailboxes, Offer, rank};
 use super::chassis::{Chassis, Escs};
 use super::esc::Esc;
 use super::fault::Faults;
 use super::joint::Drive;
 use super::line::{Line, Sender, Transmission, Wire};
-use super::mailbox::{Mailboxes, Offer, rank};
 use super::motor::{JOINTS, MOTORS, MotorConfig, MotorState};
-use super::ring::Ring;
+use super::port::Ring;
 use super::{Fault, JointConfig, MotorKey, SimError};
 use crate::frame::CanFrame;
 use embedded_can::Frame;

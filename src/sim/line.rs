@@ -1,6 +1,6 @@
-use super::bits::{INTERMISSION_BITS, frame_bits};
-use super::mailbox::Mailboxes;
-use super::ring::Ring;
+use super::can::Mailboxes;
+use super::can::{INTERMISSION_BITS, frame_bits};
+use super::port::Ring;
 use crate::frame::CanFrame;
 use crate::time::Instant;
 use embedded_can::{Frame, Id};

@@ -1,5 +1,5 @@
-use super::run::{Output, Run};
 use super::{Outcome, Rule, Subject, Violation, edges};
+use super::{Output, Run};
 use crate::frame::CanFrame;
 use crate::motor::{ArmError, Claim, Devices, Ingest, Role, TargetError};
 use crate::time::Tick;

@@ -7,7 +7,7 @@
 )]
 
 use super::DriveShaft;
-use super::shaft::{float, within};
+use super::{float, within};
 use crate::frame::CanFrame;
 use embedded_can::{Frame, Id, StandardId};
 

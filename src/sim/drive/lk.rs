@@ -8,7 +8,7 @@
 )]
 
 use super::DriveShaft;
-use super::shaft::within;
+use super::within;
 use crate::frame::CanFrame;
 use embedded_can::{Frame, Id, StandardId};
 

@@ -4,7 +4,7 @@
 #![expect(clippy::cast_possible_truncation, reason = "fields of a frame, which saturate")]
 
 use super::DriveShaft;
-use super::shaft::{float, within};
+use super::{float, within};
 use crate::frame::CanFrame;
 use crate::math::sqrt;
 use core::f64::consts::TAU;

@@ -6,7 +6,7 @@
 )]
 
 use super::DriveShaft;
-use super::shaft::within;
+use super::within;
 use crate::frame::CanFrame;
 use core::f64::consts::TAU;
 use embedded_can::{ExtendedId, Frame, Id};
