@@ -1,12 +1,15 @@
-//! Attaching and detaching of motors.
+//! Attaching, arming and detaching of motors, the conditions that forbid arming, and the load of the bus.
 
-use super::budget::Budget;
 use super::command::{Outbox, Place};
 use super::config::PlainConfig;
 use super::motors::{FIRST_FEEDBACK_ID, Key, Motors};
 use super::slot::config::configured;
+use super::slot::{Slot, health};
 use super::{AttachError, Facts};
-use crate::motor::MotorName;
+use crate::motor::{ArmError, BusLoad, Claim, Condition, Missing, MotorName, Role};
+use crate::time::Instant;
+use core::ops::Range;
+use embedded_can::StandardId;
 
 /// Attaches a motor; see [`Bus::attach`](super::Bus::attach).
 pub(super) const fn attach<const N: usize>(
@@ -101,4 +104,127 @@ pub(super) fn acceptance_filter<const N: usize>(motors: &Motors<N>) -> (u16, u16
     let differing = ids().fold(0, |bits, id| bits | (id ^ first));
     let open = if differing == 0 { 0 } else { u16::MAX >> differing.leading_zeros() };
     (first & !open, 0x7FF & !open)
+}
+
+/// Arms chosen motors; see [`Bus::arm_only`](super::Bus::arm_only).
+pub(super) fn arm_only<const N: usize>(
+    motors: &mut Motors<N>,
+    chosen: impl Iterator<Item = Key> + Clone,
+    now: Instant,
+) -> Result<(), ArmError> {
+    motors.guard.ask();
+    if motors.guard.is_stopped() {
+        return Err(ArmError::Stopped);
+    }
+    let slots = || chosen.clone().filter_map(|motor| motors.get(motor));
+    if slots().next().is_none() {
+        return Err(ArmError::NoMotors);
+    }
+    let missing = slots().filter(|slot| motors.guard.misses(&slot.guard, now));
+    if let Some(missing) = Missing::collect(missing.filter_map(Slot::name)) {
+        return Err(ArmError::Missing(missing));
+    }
+    if let Some(claim) = rival_among(slots()) {
+        return Err(ArmError::SecondMaster(claim));
+    }
+    let faulty = slots().filter(|slot| health::is_faulty(slot));
+    if let Some(faulty) = Missing::collect(faulty.filter_map(Slot::name)) {
+        return Err(ArmError::Faulty(faulty));
+    }
+    motors.guard.begin_arming(now)?;
+    for motor in chosen {
+        if motors.get(motor).is_some() {
+            let place = motor.place();
+            engage(motors, place..place + 1, now);
+        }
+    }
+    keep_trip_of_others(motors);
+    Ok(())
+}
+
+/// Arms the motors of some slots that are online and fit.
+pub(super) fn engage<const N: usize>(motors: &mut Motors<N>, slots: Range<u8>, now: Instant) {
+    for index in slots {
+        let slot = motors.slots.get(usize::from(index)).filter(|slot| health::is_fit(slot));
+        if slot.is_some_and(|slot| motors.guard.may_engage(&slot.guard, now)) {
+            motors.change(index, now, |slot| health::engage(slot, now.stamp()));
+        }
+    }
+}
+
+/// Keeps the trip if a motor without an arming still waits to be armed.
+pub(super) fn keep_trip_of_others<const N: usize>(motors: &mut Motors<N>) {
+    if motors.slots.iter().any(|slot| slot.guard.is_tripped()) {
+        motors.guard.keep_trip();
+    }
+}
+
+/// Tells whether there are motors, and all take targets.
+pub(super) fn is_armed(slots: &[Slot]) -> bool {
+    let mut attached = slots.iter().filter(|slot| slot.facts().is_some()).peekable();
+    attached.peek().is_some() && attached.all(|slot| slot.guard.is_armed())
+}
+
+/// Returns a command of one of these motors that another node has sent.
+pub(super) fn rival_among<'a>(mut slots: impl Iterator<Item = &'a Slot>) -> Option<Claim> {
+    let slot = slots.find(|slot| slot.guard.latch().has(Condition::SecondMaster))?;
+    claim(slot.place.frame().id(), Role::Command, slot.name()?)
+}
+
+pub(super) fn claim(id: u16, role: Role, motor: MotorName) -> Option<Claim> {
+    Some(Claim::new(StandardId::new(id)?, role, motor))
+}
+
+/// Rates for the computation of the load.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Budget {
+    pub(super) bit_rate: u32,
+    pub(super) tick_hz: u32,
+    pub(super) ceiling_percent: Option<u16>,
+}
+
+impl Budget {
+    pub(super) const fn new() -> Self {
+        Self { bit_rate: 1_000_000, tick_hz: 1_000, ceiling_percent: None }
+    }
+
+    /// Sets the ceiling of the load, a share, to whole percent.
+    pub(super) const fn set_ceiling(&mut self, ceiling: f32) {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "saturates, NaN gives 0: nothing can be attached"
+        )]
+        let percent = (ceiling * 100.0 + 0.5) as u16;
+        self.ceiling_percent = Some(percent);
+    }
+
+    pub(super) const fn load(&self, motors: u32, feedback_hz: u32, commands: u32) -> BusLoad {
+        BusLoad::new(self.bit_rate)
+            .with_frames(motors, feedback_hz)
+            .with_frames(commands, self.tick_hz)
+    }
+
+    /// Returns the highest feedback rate that fits below a ceiling beside the commands.
+    const fn feedback_within(&self, percent: u16, motors: u32, commands: u32) -> u32 {
+        let fits = BusLoad::new(self.bit_rate).frames_within(percent as f32 / 100.0);
+        let left = fits.saturating_sub(self.tick_hz.saturating_mul(commands));
+        let motors = if motors == 0 { 1 } else { motors };
+        left / motors
+    }
+
+    /// Returns the load, the ceiling and the highest feedback rate that fits, if the load is above the ceiling.
+    const fn overload(
+        &self,
+        motors: u32,
+        feedback_hz: u32,
+        commands: u32,
+    ) -> Option<(BusLoad, u16, u32)> {
+        let Some(ceiling) = self.ceiling_percent else { return None };
+        let load = self.load(motors, feedback_hz, commands);
+        if load.worst_percent() <= ceiling as u32 {
+            return None;
+        }
+        Some((load, ceiling, self.feedback_within(ceiling, motors, commands)))
+    }
 }

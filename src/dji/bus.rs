@@ -1,10 +1,8 @@
-use super::budget::Budget;
+use super::attach::Budget;
 use super::command::Outbox;
-use super::counters::{Counters, Rejects};
 use super::motors::{FIRST_FEEDBACK_ID, IDS, Key, Motors, is_of_others};
-use super::{
-    AnyHandle, AttachError, Config, Feedback, Handle, Model, attach, deadlines, receiving, rounds,
-};
+use super::watch::{Counters, Rejects};
+use super::{AnyHandle, AttachError, Config, Feedback, Handle, Model, attach, watch};
 use crate::frame::CanFrame;
 use crate::motor::{BusLoad, Devices, Ingest, MotorName, Timeouts, Visitor};
 use crate::time::TimeStep;
@@ -293,7 +291,7 @@ impl<B, const N: usize> Bus<B, N> {
     #[cold]
     #[inline(never)]
     fn ingest_unusual(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
-        receiving::ingest(&mut self.motors, &self.outbox, &mut self.rejects, frame, now)
+        watch::ingest(&mut self.motors, &self.outbox, &mut self.rejects, frame, now)
     }
 
     /// Takes a received standard data frame from a driver without an `embedded-can` frame type.
@@ -317,11 +315,11 @@ impl<B, const N: usize> Bus<B, N> {
         let before = self.motors.guard.begin(tick.now());
         let Some(step) = TimeStep::usable(tick.dt_s(), TimeStep::MOTOR_MAX_S) else {
             let moves_on = self.motors.guard.moves_on(before);
-            return deadlines::hold(&mut self.motors, &mut self.outbox, before, moves_on);
+            return watch::hold(&mut self.motors, &mut self.outbox, before, moves_on);
         };
         let is_quiet = self.motors.guard.is_quiet(before);
-        if !is_quiet && !deadlines::apply(&mut self.motors, &mut self.outbox, before) {
-            return deadlines::hold(&mut self.motors, &mut self.outbox, before, false);
+        if !is_quiet && !watch::apply_due(&mut self.motors, &mut self.outbox, before) {
+            return watch::hold(&mut self.motors, &mut self.outbox, before, false);
         }
         self.check_next();
         let mut rest = self.motors.taken_mut();
@@ -338,12 +336,12 @@ impl<B, const N: usize> Bus<B, N> {
     fn check_next(&mut self) {
         let index = self.motors.rounds.next;
         let Some(slot) = self.motors.slots.get_mut(usize::from(index)) else {
-            return rounds::check_without_slot(&mut self.motors, &self.outbox);
+            return watch::check_without_slot(&mut self.motors, &self.outbox);
         };
         self.motors.rounds.next = index + 1;
         let word = self.outbox.get(slot.place);
         if !slot.is_well(word, self.motors.rounds.elapsed) {
-            rounds::check(&mut self.motors, index, word);
+            watch::check(&mut self.motors, index, word);
         }
     }
 

@@ -1,6 +1,6 @@
 //! Command frames: conversion of values to wire words, and the outbox of frames.
 
-use super::range::Range;
+use super::model::Range;
 use crate::frame::CanFrame;
 
 /// One of the five command frames: four motors each.

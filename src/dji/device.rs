@@ -1,11 +1,15 @@
-//! The bus as a device of the runner.
+//! The bus as a device of the runner, and as an owner of motors for a chassis.
 
-use super::Bus;
-use super::arming::{self, claim};
+use super::attach::{self, claim};
 use super::slot::{Slot, health};
+use super::{AnyHandle, Bus, Handle, Model};
 use crate::frame::CanFrame;
-use crate::motor::{CanDevice, Claim, Edge, Ingest, MotorName, Role, WrongSetting};
+use crate::motor::{
+    AngleDrive, CanDevice, Capabilities, Claim, Edge, Ingest, Link, MotorName, Role, TargetError,
+    VelocityDrive, WrongSetting,
+};
 use crate::time::{Instant, Tick};
+use crate::units::{Angle, AngularVelocity};
 
 impl<B, const N: usize> CanDevice for Bus<B, N> {
     fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
@@ -55,7 +59,7 @@ impl<B, const N: usize> CanDevice for Bus<B, N> {
     }
 
     fn second_master(&self) -> Option<Claim> {
-        arming::rival_among(self.motors.slots.iter())
+        attach::rival_among(self.motors.slots.iter())
     }
 
     fn next_edge(&mut self) -> Option<Edge> {
@@ -69,8 +73,8 @@ impl<B, const N: usize> CanDevice for Bus<B, N> {
     fn engage(&mut self, now: Instant) {
         if !self.motors.guard.is_far(now) && self.motors.guard.begin_arming(now).is_ok() {
             let all = 0..self.motors.used;
-            arming::engage(&mut self.motors, all, now);
-            arming::keep_trip_of_others(&mut self.motors);
+            attach::engage(&mut self.motors, all, now);
+            attach::keep_trip_of_others(&mut self.motors);
         }
     }
 
@@ -104,4 +108,72 @@ impl Default for Bus {
     fn default() -> Self {
         Self::new()
     }
+}
+
+impl<M: Model, B, const N: usize> VelocityDrive<Handle<M, B>> for Bus<B, N> {
+    fn velocity(&self, motor: Handle<M, B>) -> Option<AngularVelocity> {
+        velocity(self, motor.into())
+    }
+
+    fn capabilities(&self, motor: Handle<M, B>) -> Capabilities {
+        Self::capabilities(self, motor)
+    }
+
+    fn set_velocity(
+        &mut self,
+        motor: Handle<M, B>,
+        target: AngularVelocity,
+    ) -> Result<(), TargetError> {
+        Self::set_velocity(self, motor, target)
+    }
+}
+
+impl<B, const N: usize> VelocityDrive<AnyHandle<B>> for Bus<B, N> {
+    fn velocity(&self, motor: AnyHandle<B>) -> Option<AngularVelocity> {
+        velocity(self, motor)
+    }
+
+    fn capabilities(&self, motor: AnyHandle<B>) -> Capabilities {
+        Self::capabilities(self, motor)
+    }
+
+    fn set_velocity(
+        &mut self,
+        motor: AnyHandle<B>,
+        target: AngularVelocity,
+    ) -> Result<(), TargetError> {
+        Self::set_velocity(self, motor, target)
+    }
+}
+
+impl<M: Model, B, const N: usize> AngleDrive<Handle<M, B>> for Bus<B, N> {
+    fn angle(&self, motor: Handle<M, B>) -> Option<Angle> {
+        angle(self, motor.into())
+    }
+
+    fn set_angle(&mut self, motor: Handle<M, B>, target: Angle) -> Result<(), TargetError> {
+        Self::set_angle(self, motor, target)
+    }
+}
+
+impl<B, const N: usize> AngleDrive<AnyHandle<B>> for Bus<B, N> {
+    fn angle(&self, motor: AnyHandle<B>) -> Option<Angle> {
+        angle(self, motor)
+    }
+
+    fn set_angle(&mut self, motor: AnyHandle<B>, target: Angle) -> Result<(), TargetError> {
+        Self::set_angle(self, motor, target)
+    }
+}
+
+/// Returns the measured velocity of a motor that is online.
+fn velocity<B, const N: usize>(bus: &Bus<B, N>, motor: AnyHandle<B>) -> Option<AngularVelocity> {
+    let slot = bus.motors.get(motor.key())?;
+    (slot.guard.link() == Link::Online).then(|| slot.velocity())
+}
+
+/// Returns the measured angle of a motor that is online, if its absolute angle is known.
+fn angle<B, const N: usize>(bus: &Bus<B, N>, motor: AnyHandle<B>) -> Option<Angle> {
+    let state = bus.motors.get(motor.key())?.state()?;
+    (state.link == Link::Online && state.homing.is_known()).then(|| state.position.angle())
 }

@@ -168,39 +168,28 @@
 //! voltage limit: 25000 for current motors, 30000 for old motors ([`Config::with_legacy_full_scale`]). The voltage of full scale is
 //! nominal: sources state 24 V or 25.2 V.
 
-mod arming;
 mod attach;
-mod budget;
 mod bus;
 mod command;
 mod config;
-mod counters;
-mod deadlines;
 mod device;
-mod drive;
 mod error;
 mod feedback;
 mod limit;
 mod measured;
 mod model;
 mod motors;
-mod range;
-mod receiving;
-mod rounds;
 mod slot;
-mod state;
 mod targets;
 #[cfg(test)]
 mod tests;
-mod word_gains;
+mod watch;
 
 pub use bus::Bus;
 pub use command::CommandFrame;
-pub use config::Config;
-pub use counters::Counters;
+pub use config::{Config, WordGains};
 pub use error::{AttachError, Message};
-pub use feedback::{ErrorCode, Feedback};
+pub use feedback::{ErrorCode, Feedback, State};
 pub use model::{Facts, Gm6020Current, Gm6020Voltage, M2006, M3508, Model};
 pub use motors::{AnyHandle, Handle};
-pub use state::State;
-pub use word_gains::WordGains;
+pub use watch::Counters;

@@ -1,7 +1,7 @@
 //! Motors of a bus in their slots, and the handles of motors.
 
-use super::rounds::Rounds;
 use super::slot::Slot;
+use super::watch::Rounds;
 use super::{CommandFrame, Model};
 use crate::frame::CanFrame;
 use crate::motor::{DeviceGuard, TargetError};

@@ -3,15 +3,14 @@
 //! Less frequent tasks of a motor are in the files of the folder.
 
 pub(super) mod config;
-mod duty;
 pub(super) mod gap;
 pub(super) mod health;
 mod target;
 
 use super::command::{Outbox, Place, free_to_raw, loop_to_raw, saturate};
 use super::config::USUAL;
+use super::model::Range;
 use super::motors::Key;
-use super::range::Range;
 use super::{Facts, Feedback, State};
 use crate::control::{ErrorPid, Pid, PidConfig};
 use crate::encoder::{GearRatio, Homing, Position, Shaft, shortest};
@@ -22,8 +21,8 @@ use crate::units::{AngularVelocity, Current};
 
 /// The refusal of a handle of a detached motor.
 pub(super) const DETACHED: ConfigError = ConfigError::Unusable("handle of a detached motor");
-use duty::{Action, Duty};
 pub(super) use health::Surroundings;
+use target::{Action, Duty};
 
 /// Current of a motor that does not drive itself: a fifth of the full scale of the smallest ESC.
 const CALM_CURRENT: i32 = 2_000;

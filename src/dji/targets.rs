@@ -1,7 +1,7 @@
 //! Functions of an application: state, health, arming, targets.
 
 use super::slot::{DETACHED, config, gap, health};
-use super::{AnyHandle, Bus, Handle, Model, State, arming, limit, measured, rounds};
+use super::{AnyHandle, Bus, Handle, Model, State, attach, limit, measured, watch};
 use crate::control::PidConfig;
 use crate::encoder::Position;
 use crate::error::ConfigError;
@@ -92,7 +92,7 @@ impl<B, const N: usize> Bus<B, N> {
         if self.motors.guard.journal().is_empty() {
             None
         } else {
-            rounds::take_edge(&mut self.motors)
+            watch::take_edge(&mut self.motors)
         }
     }
 
@@ -118,7 +118,7 @@ impl<B, const N: usize> Bus<B, N> {
     /// Tells whether every motor takes targets: false if any motor waits to be armed.
     #[must_use]
     pub fn is_armed(&self) -> bool {
-        arming::is_armed(&self.motors.slots)
+        attach::is_armed(&self.motors.slots)
     }
 
     /// Relaxes every motor at once, until the stop is cleared and the bus armed.
@@ -161,7 +161,7 @@ impl<B, const N: usize> Bus<B, N> {
     /// ```
     pub fn arm_only(&mut self, motors: &[AnyHandle<B>], now: Instant) -> Result<(), ArmError> {
         let chosen = motors.iter().map(|motor| motor.key());
-        arming::arm_only(&mut self.motors, chosen, now)
+        attach::arm_only(&mut self.motors, chosen, now)
     }
 }
 

@@ -6,7 +6,7 @@ use crate::dji::command::{Place, to_raw};
 use crate::dji::config::PlainConfig;
 use crate::dji::error::SteepGain;
 use crate::dji::feedback::ErrorTable;
-use crate::dji::range::Range;
+use crate::dji::model::Range;
 use crate::dji::{AttachError, Facts};
 use crate::encoder::{COUNTS_PER_TURN, Homing, Shaft};
 use crate::error::ConfigError;

@@ -1,10 +1,9 @@
 //! Targets of a new kind, and loops outside the usual path.
 
-use super::duty::{Action, Duty};
 use super::{Goal, Slot, health, needs};
 use crate::control::Pid;
 use crate::dji::command::{Outbox, saturate, to_raw};
-use crate::dji::range::Range;
+use crate::dji::model::Range;
 use crate::encoder::Position;
 use crate::motor::{Link, MotorGuard, Rest, TargetError, Timeouts};
 use crate::time::TimeStep;
@@ -144,7 +143,7 @@ impl Slot {
 
     #[cold]
     #[inline(never)]
-    pub(super) fn start_anew(&mut self, action: Action, now: u32) {
+    fn start_anew(&mut self, action: Action, now: u32) {
         self.asked = action;
         self.guard.take_target(now);
         self.apply_rules();
@@ -293,6 +292,43 @@ impl Slot {
     pub(super) fn direction(&self) -> f32 {
         1.0_f32.copysign(self.raw_per_unit)
     }
+}
+
+/// Action set by the target of a motor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub(super) enum Action {
+    Rest,
+    Raw,
+    Velocity,
+    /// By the shortest way.
+    Angle,
+    Position,
+    /// By the remaining way that another sensor measures.
+    Measured,
+}
+
+impl Action {
+    /// Tells whether the action goes to a position of the shaft.
+    pub(super) const fn is_way(self) -> bool {
+        matches!(self, Self::Angle | Self::Position)
+    }
+}
+
+/// Task of an update: the action itself in the usual, simple case.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub(super) enum Duty {
+    Rest,
+    /// The first run of any action since a rest.
+    First,
+    Raw,
+    /// The speed loop, plain and with the full output: its own limit is enough.
+    Velocity,
+    /// Both loops, as above.
+    Position,
+    /// Any other action, within the available output; also the first run of an action in place of another.
+    Other,
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use crate::dji::command::{free_to_raw, loop_to_raw};
 use crate::dji::model::ALL_FACTS;
-use crate::dji::range::Range;
+use crate::dji::model::Range;
 use crate::dji::{Config, Gm6020Voltage};
 use crate::math::tests::every_f32;
 

@@ -1,0 +1,324 @@
+//! Events outside the usual path of a tick:
+//!
+//! * frames: the first frame of a motor, a frame after a gap, a frame with an error, and frames that are no feedback;
+//! * time: ages that exceed their limits, keep-alives, updates without a usable step;
+//! * checks of one motor a tick, in rounds.
+
+use super::command::Outbox;
+use super::motors::{FIRST_FEEDBACK_ID, IDS, Motors};
+use super::slot::{Slot, Surroundings, gap, health};
+use super::{CommandFrame, Feedback};
+use crate::frame::CanFrame;
+use crate::motor::{Ages, Edge, Hold, Ingest, Malformed, Rival, Traffic, elapsed};
+use crate::time::Instant;
+
+/// Takes any frame.
+#[inline]
+pub(super) fn ingest<const N: usize>(
+    motors: &mut Motors<N>,
+    outbox: &Outbox,
+    rejects: &mut Rejects,
+    frame: &CanFrame,
+    now: Instant,
+) -> Ingest {
+    let id_index = frame.header().wrapping_sub(FIRST_FEEDBACK_ID) as usize;
+    if id_index >= IDS {
+        hear_command(motors, outbox, frame.header(), now);
+        return Ingest::Unrelated;
+    }
+    let index = motors.slot_of(id_index);
+    let Some(facts) = motors.slots.get(index).and_then(Slot::facts) else {
+        rejects.unattached = rejects.unattached.saturating_add(1);
+        return Ingest::Unrelated;
+    };
+    if frame.length() != 8 {
+        rejects.bad_length = rejects.bad_length.saturating_add(1);
+        return Ingest::Malformed(Malformed::Length(frame.length()));
+    }
+    let Some(feedback) = Feedback::decode(frame.bytes()) else {
+        rejects.bad_field = rejects.bad_field.saturating_add(1);
+        return Ingest::Malformed(Malformed::Field);
+    };
+    let running = motors.guard.is_running();
+    if running && has_nothing_new(motors, index, feedback, now) {
+        return Ingest::Taken;
+    }
+    if !running {
+        let before = motors.guard.pass_unwatched(now);
+        forget_bygones(motors, before);
+    }
+    let timeouts = *motors.guard.timeouts();
+    #[expect(clippy::cast_possible_truncation, reason = "below 11")]
+    let in_time = motors.change(index as u8, now, |slot| {
+        let in_time = slot.receive(feedback, now.stamp());
+        if !in_time {
+            gap::receive(slot, facts, feedback, now.stamp(), &timeouts, running);
+        }
+        health::hear_error(slot, facts, feedback.error());
+        in_time
+    });
+    if in_time == Some(false) {
+        motors.guard.disturb();
+    }
+    Ingest::Taken
+}
+
+/// Takes feedback in time, without an error or with a known one. Returns `false` for any other feedback, or if the frame was not taken.
+fn has_nothing_new<const N: usize>(
+    motors: &mut Motors<N>,
+    index: usize,
+    feedback: Feedback,
+    now: Instant,
+) -> bool {
+    let Some(slot) = motors.slots.get_mut(index) else { return false };
+    let Some(facts) = slot.facts() else { return false };
+    slot.guard.is_in_time(now.stamp())
+        && health::hear_known_error(slot, facts, feedback.error())
+        && slot.receive(feedback, now.stamp())
+}
+
+/// Applies all due time-outs and keep-alives, and computes the time of the next. Returns `false` if time did not move on.
+#[cold]
+#[inline(never)]
+pub(super) fn apply_due<const N: usize>(
+    motors: &mut Motors<N>,
+    outbox: &mut Outbox,
+    before: Instant,
+) -> bool {
+    if !motors.guard.moves_on(before) {
+        return false;
+    }
+    if motors.guard.is_pause(before) {
+        forget_bygones(motors, before);
+    }
+    motors.guard.run();
+    let keep_alive_us = outbox.keep_alive(motors.guard.now());
+    let ages = motors.guard.ages().map(|ages| add_ages(motors, ages));
+    if let Some(micros) = ages.and_then(|ages| ages.within_limits_us()) {
+        motors.guard.rest_for(micros.min(keep_alive_us));
+    } else {
+        expire(motors);
+    }
+    true
+}
+
+fn add_ages<const N: usize>(motors: &Motors<N>, mut ages: Ages) -> Ages {
+    let mut rest = motors.taken();
+    while let [slot, others @ ..] = rest {
+        ages.add(&slot.guard);
+        rest = others;
+    }
+    ages
+}
+
+/// Compares the ages of each motor with their limits.
+#[cold]
+#[inline(never)]
+fn expire<const N: usize>(motors: &mut Motors<N>) {
+    let (now, updated, timeouts) =
+        (motors.guard.now(), motors.guard.updated(), *motors.guard.timeouts());
+    for index in 0..motors.used {
+        if motors.change(index, updated, |slot| slot.guard.age(now, &timeouts)) == Some(false) {
+            motors.guard.disturb();
+        }
+    }
+}
+
+/// Discards each stamp whose age a 32-bit counter can no longer represent; after a pause, discards all stamps.
+///
+/// Call this wherever time passes without a comparison of ages.
+#[cold]
+#[inline(never)]
+pub(super) fn forget_bygones<const N: usize>(motors: &mut Motors<N>, before: Instant) {
+    let (now, is_pause) = (motors.guard.updated(), motors.guard.is_pause(before));
+    motors.change_all(now, |slot| slot.guard.forget_bygones(now.stamp(), is_pause));
+}
+
+/// Ends an update without a usable time or time step.
+#[cold]
+#[inline(never)]
+pub(super) fn hold<const N: usize>(
+    motors: &mut Motors<N>,
+    outbox: &mut Outbox,
+    before: Instant,
+    moves_on: bool,
+) {
+    forget_bygones(motors, before);
+    match motors.guard.hold(before, moves_on) {
+        Hold::Keep => {}
+        Hold::Rest => outbox.clear(),
+        Hold::LoseTime => {
+            motors.change_all(motors.guard.updated(), |slot| slot.lose_time());
+            outbox.clear();
+            return outbox.finish_update();
+        }
+    }
+    // A motor without a target rests at once.
+    for slot in motors.slots.iter().filter(|slot| slot.has_rested()) {
+        outbox.put(slot.place, 0);
+    }
+    outbox.keep_alive(motors.guard.now());
+    outbox.finish_update();
+}
+
+/// The motor to check next, and the times of the round.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rounds {
+    /// Begin of the present counting window.
+    window_from: u32,
+    /// Time of the last command frame of another node.
+    rival_heard: u32,
+    /// Begin of the present round.
+    begun: u32,
+    /// The rate of each motor's feedback, as configured.
+    pub(super) feedback_hz: u32,
+    /// The length of the window that ends in this round, in units of 1.024 ms.
+    window: u16,
+    /// The length of the previous round.
+    pub(super) elapsed: u8,
+    /// Place of the motor to check next; in a round that ends a window, beyond [`CLOSING`](Self::CLOSING).
+    pub(super) next: u8,
+    has_begun: bool,
+    /// Whether sent frames are received again.
+    pub(super) echoes: bool,
+}
+
+impl Rounds {
+    pub(super) const NEW: Self = Self {
+        window_from: 0,
+        rival_heard: 0,
+        begun: 0,
+        feedback_hz: 1_000,
+        window: 0,
+        elapsed: 0,
+        next: 0,
+        has_begun: false,
+        echoes: false,
+    };
+
+    /// In a round that ends a window, each motor is checked in full: no slot has such a number, so the quick check is skipped.
+    const CLOSING: u8 = 0x80;
+
+    /// Returns the length of the window that ends in this round; `None` if no window ends.
+    const fn window(&self) -> Option<u16> {
+        if self.next & Self::CLOSING != 0 { Some(self.window) } else { None }
+    }
+
+    /// Begins a new round: one tick for each place, and one for this call.
+    fn begin(&mut self, now: u32) {
+        self.elapsed = elapsed(Some(now.wrapping_sub(self.begun)));
+        self.begun = now;
+        let elapsed = now.wrapping_sub(self.window_from);
+        let closes_window = self.has_begun && u64::from(elapsed) >= Traffic::WINDOW.as_micros();
+        self.next = if closes_window { Self::CLOSING } else { 0 };
+        if closes_window || !self.has_begun {
+            self.window = u16::try_from(elapsed >> 10).unwrap_or(u16::MAX);
+            self.window_from = now;
+            self.has_begun = true;
+        }
+    }
+}
+
+/// Checks a motor in a round that ends a window, or begins a round.
+#[cold]
+#[inline(never)]
+pub(super) fn check_without_slot<const N: usize>(motors: &mut Motors<N>, outbox: &Outbox) {
+    let index = motors.rounds.next & !Rounds::CLOSING;
+    match motors.slots.get(usize::from(index)) {
+        Some(slot) => {
+            let word = outbox.get(slot.place);
+            motors.rounds.next += 1;
+            check(motors, index, word);
+        }
+        // A round has a turn for each id: it takes the same time on every bus.
+        None if usize::from(index) < IDS => motors.rounds.next += 1,
+        None => motors.rounds.begin(motors.guard.now()),
+    }
+}
+
+/// Checks a motor in full.
+#[inline(never)]
+pub(super) fn check<const N: usize>(motors: &mut Motors<N>, index: u8, word: i16) {
+    let now = motors.guard.now();
+    let seen = Surroundings {
+        now,
+        elapsed: motors.rounds.elapsed,
+        word,
+        window: motors.rounds.window(),
+        feedback_hz: motors.rounds.feedback_hz,
+        is_alone: u64::from(now.wrapping_sub(motors.rounds.rival_heard))
+            > Rival::FORGOTTEN.as_micros(),
+    };
+    motors.change(index, motors.guard.updated(), |slot| health::check(slot, &seen));
+}
+
+/// Takes a frame of another node that may be a command of this bus.
+fn hear_command<const N: usize>(motors: &mut Motors<N>, outbox: &Outbox, id: u32, now: Instant) {
+    let Some(frame) = CommandFrame::with_id(id) else { return };
+    if motors.rounds.echoes || !outbox.is_in_use(frame) {
+        return;
+    }
+    motors.rounds.rival_heard = now.stamp();
+    motors.change_all(now, |slot| {
+        if slot.facts().is_some() && slot.place.frame() == frame {
+            health::hear_rival(slot);
+        }
+    });
+}
+
+/// Takes the oldest unread edge.
+#[inline(never)]
+pub(super) fn take_edge<const N: usize>(motors: &mut Motors<N>) -> Option<Edge> {
+    let updated = motors.guard.updated();
+    while let Some(entry) = motors.guard.journal_mut().pop() {
+        let at = motors.guard.journal().time_of(&entry, updated);
+        let Some(slot) = motors.slots.get_mut(usize::from(entry.motor)) else { continue };
+        let Some(motor) = slot.name() else { continue };
+        let (condition, began) = (entry.condition, entry.began);
+        if slot.guard.latch_mut().take(condition, began) {
+            return Some(Edge { motor, condition, began, at });
+        }
+    }
+    let at = motors.guard.journal().last_time(updated);
+    let edge = motors.slots.iter_mut().find_map(|slot| {
+        let motor = slot.name()?;
+        let (condition, began) = slot.guard.latch().next()?;
+        slot.guard.latch_mut().take(condition, began);
+        Some(Edge { motor, condition, began, at })
+    });
+    if edge.is_none() {
+        motors.guard.journal_mut().clear();
+    }
+    edge
+}
+
+/// Counters of a bus. All saturate, except `packed` and `superseded`, which wrap at 2^32.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Counters {
+    /// Feedback frames of another length than 8 bytes.
+    pub bad_length: u32,
+    /// Feedback frames with an angle above 8191.
+    pub bad_field: u32,
+    /// Frames with a feedback id of this family but no attached motor: a sign of a wrong id switch.
+    pub unattached: u32,
+    /// Updates with a time step of zero, negative or NaN, or with a time that did not move on.
+    pub bad_steps: u32,
+    /// Command frames made ready by updates; wraps.
+    pub packed: u32,
+    /// Command frames replaced by newer ones before they were taken, or after they were given back; wraps.
+    pub superseded: u32,
+}
+
+/// Refused frames.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rejects {
+    pub(super) bad_length: u32,
+    pub(super) bad_field: u32,
+    pub(super) unattached: u32,
+}
+
+impl Rejects {
+    pub(super) const NONE: Self = Self { bad_length: 0, bad_field: 0, unattached: 0 };
+}
