@@ -1,6 +1,6 @@
 //! One device or several, as seen by their caller.
 
-use super::visitor::{
+use super::device::{
     Ask, Back, ClearStop, Disarm, Engage, Nth, Obstacles, Offer, Parts, Read, Rival, Search,
     Standing, Stop, Superseded, Trip, Update, Visitor,
 };

@@ -40,29 +40,23 @@ mod health;
 mod homing;
 mod link;
 mod load;
-mod measured;
-mod name;
 mod own;
 mod safety;
-mod setting;
-mod visitor;
-mod vitals;
 mod watch;
 
-pub use arming::{ArmError, Missing};
+pub use arming::{ArmError, Missing, WrongSetting};
 pub use capability::{Capabilities, Capability};
-pub use claim::{Claim, Role};
-pub use device::{CanDevice, Ingest, Malformed};
+pub use claim::{Claim, MotorName, Role};
+pub(crate) use device::Ask;
+pub use device::{CanDevice, Ingest, Malformed, Visitor};
 pub use devices::Devices;
-pub use drive::{AngleDrive, OneOf, TargetError, VelocityDrive};
+pub use drive::{AngleDrive, Measured, OneOf, TargetError, VelocityDrive};
 pub use guard::Guard;
 pub use health::{Condition, Conditions, Edge, Health, HealthConfig, Reaction};
 pub(crate) use health::{Journal, Latch, Monitor, Rival, Sample, Traffic, elapsed};
 pub use homing::{HomingStep, ShaftState, StopHoming};
 pub use link::{Link, Timeouts};
 pub use load::BusLoad;
-pub use measured::Measured;
-pub use name::MotorName;
 pub(crate) use own::{
     ControlMode, Form, Goal, Laps, Preparation, Questions, Shaft, Tachometer, TimeoutUnits, Told,
     TorqueLoops, code_from, ingest_eight, inside, lowest_bit, mit_model, models,
@@ -71,8 +65,5 @@ pub(crate) use own::{
 pub use own::{Impedance, ImpedanceControl, Inquiry, Order, Own, OwnMotor, Settings, Target};
 pub use safety::OPENING;
 pub(crate) use safety::{Ages, DeviceGuard, Hold, LONGEST_PAUSE, MotorGuard, Rest, age, take_age};
-pub use setting::WrongSetting;
-pub(crate) use visitor::Ask;
-pub use visitor::Visitor;
-pub use vitals::{Severity, Vitals};
 pub(crate) use watch::Watch;
+pub use watch::{Severity, Vitals};
