@@ -1,17 +1,18 @@
 mod config;
-mod drive;
-mod health;
 
 use super::Direction;
 use super::rc::duty;
 use crate::control::Pid;
 use crate::error::ConfigError;
-use crate::motor::{ArmError, Guard, Missing, TargetError, Watch};
-use crate::time::TimeStep;
-use crate::time::{Instant, Tick};
-pub use config::BrushedConfig;
+use crate::motor::{
+    ArmError, Capabilities, Capability, Guard, Link, Missing, TargetError, VelocityDrive, Watch,
+};
+use crate::time::{Instant, Tick, TimeStep};
+use crate::units::AngularVelocity;
 use core::f32::consts::TAU;
 use embedded_hal::pwm::SetDutyCycle;
+
+pub use config::BrushedConfig;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Target {
@@ -329,5 +330,28 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     #[must_use]
     pub const fn guard(&self) -> &Guard {
         &self.guard
+    }
+}
+
+impl<P: SetDutyCycle, D: Direction> VelocityDrive<()> for Brushed<P, D> {
+    fn velocity(&self, (): ()) -> Option<AngularVelocity> {
+        let fresh = self.config.counts_per_turn.is_some() && self.guard.link() == Link::Online;
+        fresh.then(|| AngularVelocity::from_rad_per_s(self.rad_per_s))
+    }
+
+    fn capabilities(&self, (): ()) -> Capabilities {
+        let set = Capabilities::of(&[Capability::Raw]);
+        let set = if self.speed.is_some() { set.with(Capability::Velocity) } else { set };
+        let listens = self.config.counts_per_turn.is_some();
+        if listens { set.with(Capability::Feedback) } else { set }
+    }
+
+    fn set_velocity(&mut self, (): (), target: AngularVelocity) -> Result<(), TargetError> {
+        if self.speed.is_none() {
+            return Err(TargetError::NoLoop);
+        }
+        self.admit(target.as_rad_per_s().is_finite())?;
+        self.target = Target::Velocity(target.as_rad_per_s());
+        Ok(())
     }
 }

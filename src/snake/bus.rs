@@ -1,9 +1,6 @@
-use super::answers::Answers;
-use super::budget::{Budget, limited};
-use super::counters::{Counters, count};
-use super::model::{IDS, SLOTS};
-use super::schedule;
-use super::slot::{Slot, health, name};
+use super::model::{IDS, SLOTS, name};
+use super::schedule::{self, Answers, Budget, Counters, count, limited};
+use super::slot::{Slot, health};
 use super::{AttachError, Command, Config, Joint, Reply, State};
 use crate::frame::CanFrame;
 use crate::motor::{BusLoad, DeviceGuard, Hold, Ingest, Link, Malformed, MotorName, Timeouts};

@@ -80,31 +80,22 @@
 //! replies for every register. If a drive does not reply for `10`, one request of 24 stays unanswered ([`State::unanswered`]), and a drive
 //! that lost its enable is detected only by its position.
 
-mod answers;
-mod budget;
 mod bus;
 mod command;
 mod config;
-mod counters;
 mod device;
-mod error;
 mod feedback;
-mod handle;
 mod model;
-mod offset;
 mod schedule;
 mod slot;
-mod state;
 mod targets;
 #[cfg(test)]
 mod tests;
 
 pub use bus::Joints;
 pub use command::Command;
-pub use config::Config;
-pub use counters::Counters;
-pub use error::AttachError;
-pub use feedback::Reply;
-pub use handle::Joint;
+pub use config::{AttachError, Config};
+pub use feedback::{Reply, State};
 pub use model::{IDS, PULSES_PER_TURN, Register};
-pub use state::State;
+pub use schedule::Counters;
+pub use targets::Joint;

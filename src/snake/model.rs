@@ -1,5 +1,8 @@
 //! Static facts of the drives.
 
+use crate::motor::MotorName;
+use core::f32::consts::TAU;
+
 pub use crate::wire::host_link::PULSES_PER_TURN;
 
 /// The highest id of a joint; the lowest is 1.
@@ -93,4 +96,15 @@ impl Register {
     pub const fn is_writable(self) -> bool {
         !matches!(self, Self::ActualSpeed | Self::ActualPosition)
     }
+}
+
+pub(super) const fn name(id: u8) -> MotorName {
+    MotorName::new("snake joint", id)
+}
+
+/// Rounds rad or rad/s to pulses; saturates, NaN gives 0.
+#[expect(clippy::cast_possible_truncation, reason = "saturates")]
+pub(super) fn to_pulses(radians: f32) -> i32 {
+    let pulses = radians * (PULSES_PER_TURN as f32 / TAU);
+    (pulses + 0.5_f32.copysign(pulses)) as i32
 }

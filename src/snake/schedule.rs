@@ -1,9 +1,11 @@
-//! Order of the joints for disables, writes and requests.
+//! Order of the joints for disables, writes and requests; outstanding replies, by id, since a reply may arrive after its joint was
+//! detached; and the load of the bus.
 
-use super::counters::count;
-use super::model::IDS;
-use super::{Command, Joints};
+use super::model::{IDS, SLOTS};
+use super::{Command, Joints, Register};
 use crate::frame::CanFrame;
+use crate::motor::BusLoad;
+use crate::time::{Duration, Instant};
 use embedded_can::Frame;
 
 /// Chooses the frames of this update: first pending and requeued frames, then those of the next joints in turn.
@@ -192,4 +194,153 @@ const fn next_after(last: u8, joints: u16) -> Option<u8> {
 #[expect(clippy::cast_possible_truncation, reason = "at most 15")]
 const fn lowest(bits: u16) -> Option<u8> {
     if bits == 0 { None } else { Some(bits.trailing_zeros() as u8) }
+}
+
+/// Requests without a reply, one place per joint.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Answers([Owed; SLOTS]);
+
+#[derive(Debug, Clone, Copy)]
+struct Owed {
+    due: Option<(Register, Instant)>,
+    /// Requests that expired and were not answered since, one bit each: a driver may still hold them.
+    given_up: u32,
+}
+
+const fn bit(register: Register) -> u32 {
+    1 << register.as_raw()
+}
+
+impl Answers {
+    pub(super) const NONE: Self = Self([Owed { due: None, given_up: 0 }; SLOTS]);
+
+    pub(super) fn of(&self, index: usize) -> Option<Register> {
+        let (register, _) = self.0.get(index)?.due?;
+        Some(register)
+    }
+
+    pub(super) fn expect(&mut self, index: usize, register: Register, now: Instant) {
+        if let Some(owed) = self.0.get_mut(index) {
+            owed.due = Some((register, now));
+        }
+    }
+
+    /// Takes a reply: the outstanding one, or a reply for another register.
+    pub(super) fn take(&mut self, index: usize, register: Register) {
+        if let Some(owed) = self.0.get_mut(index) {
+            owed.given_up &= !bit(register);
+            owed.due = owed.due.filter(|(asked, _)| *asked != register);
+        }
+    }
+
+    /// Takes back a request that was not sent. Returns `false` if the request expired before, or may have: the reply to another request is
+    /// then still outstanding.
+    pub(super) fn take_back(&mut self, index: usize, register: Register) -> bool {
+        let Some(owed) = self.0.get_mut(index) else { return false };
+        let is_given_up = owed.given_up & bit(register) != 0;
+        owed.due.take_if(|(asked, _)| *asked == register && !is_given_up).is_some()
+    }
+
+    /// Returns the joints with an outstanding reply, one bit each.
+    fn owing(&self) -> u16 {
+        (0..).zip(&self.0).map(|(index, owed)| u16::from(owed.due.is_some()) << index).sum()
+    }
+
+    /// Drops overdue replies, and returns their joints; without a time-out, drops all.
+    pub(super) fn give_up(
+        &mut self,
+        now: Instant,
+        reply_timeout: Option<Duration>,
+    ) -> impl Iterator<Item = usize> {
+        self.0.iter_mut().enumerate().filter_map(move |(index, owed)| {
+            let (register, since) = owed.due?;
+            // After a set-back of the clock, the time since the request alone would delay the expiry for long.
+            let passed = now.since(since).max(since.since(now));
+            reply_timeout.is_none_or(|timeout| passed > timeout).then(|| {
+                *owed = Owed { due: None, given_up: owed.given_up | bit(register) };
+                index
+            })
+        })
+    }
+}
+
+/// Number of frames in an update, and the rates for the load.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Budget {
+    pub(super) reads: u8,
+    pub(super) writes: u8,
+    pub(super) bit_rate: u32,
+    pub(super) tick_hz: u32,
+}
+
+impl Budget {
+    pub(super) const fn new() -> Self {
+        Self { reads: 1, writes: 1, bit_rate: 1_000_000, tick_hz: 1_000 }
+    }
+
+    /// Returns the load of requests, replies and writes, while all joints move.
+    pub(super) const fn load(&self) -> BusLoad {
+        let Self { reads, writes, bit_rate, tick_hz } = *self;
+        BusLoad::new(bit_rate).with_frames_of(2, reads as u32, tick_hz).with_frames_of(
+            6,
+            reads as u32 + writes as u32,
+            tick_hz,
+        )
+    }
+}
+
+/// Returns a number of frames in an update, 1 to 12.
+pub(super) const fn limited(frames: u8) -> u8 {
+    match frames {
+        0 => 1,
+        1..=12 => frames,
+        _ => 12,
+    }
+}
+
+/// Counters of a bus. All saturate, except `packed` and `superseded`, which wrap at 2^32.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Counters {
+    /// Accepted replies.
+    pub replies: u32,
+    /// Frames with a joint's id and another length than 6.
+    pub bad_length: u32,
+    /// Frames with a joint's id that are no reply, or that name an unknown register.
+    pub bad_field: u32,
+    /// Frames with a joint's id that only a controller sends: there is a second controller on the bus.
+    pub foreign_commands: u32,
+    /// Frames with the id of a joint that is not attached.
+    pub unattached: u32,
+    /// Requests sent, less requests given back.
+    pub requests: u32,
+    /// Requests not answered in time, including requests given back after that.
+    pub unanswered: u32,
+    /// Updates with a time step of zero, negative, infinite or NaN, or with a time that stood still.
+    pub bad_steps: u32,
+    /// Frames that were ready: chosen by an update, or disables, whenever due; wraps.
+    pub packed: u32,
+    /// Frames replaced by newer ones before they were taken, or after they were given back; wraps.
+    pub superseded: u32,
+}
+
+impl Counters {
+    pub(super) const NONE: Self = Self {
+        replies: 0,
+        bad_length: 0,
+        bad_field: 0,
+        foreign_commands: 0,
+        unattached: 0,
+        requests: 0,
+        unanswered: 0,
+        bad_steps: 0,
+        packed: 0,
+        superseded: 0,
+    };
+}
+
+/// Counts one more; saturates.
+pub(super) const fn count(counter: &mut u32) {
+    *counter = counter.saturating_add(1);
 }

@@ -1,13 +1,10 @@
 //! One joint: from replies to the next frame.
 
 pub(super) mod health;
-mod writing;
 
-use super::config::Settings;
-use super::config::Stall;
-use super::model::{FASTEST, PULSES_PER_TURN};
-use super::offset::Offset;
-use super::{AttachError, Config, Joint, Register, Reply, State};
+use super::config::{Offset, Settings, Stall};
+use super::model::{FASTEST, PULSES_PER_TURN, name, to_pulses};
+use super::{AttachError, Command, Config, Joint, Register, Reply, State};
 use crate::encoder::{Homing, Position};
 use crate::motor::{Condition, Guard, Link, MotorName, Rival, Timeouts, Traffic};
 use crate::time::{Duration, Instant};
@@ -346,13 +343,53 @@ impl Slot {
     }
 }
 
-pub(super) const fn name(id: u8) -> MotorName {
-    MotorName::new("snake joint", id)
-}
+impl Slot {
+    /// Notes a disable at `now`. With a new target, the joint is then brought up from the beginning.
+    pub(super) const fn told_to_relax(&mut self, now: Instant) {
+        self.stopped = now;
+        (self.pending, self.ahead) = (ALL, ALL);
+    }
 
-/// Rounds rad or rad/s to pulses; saturates, NaN gives 0.
-#[expect(clippy::cast_possible_truncation, reason = "saturates")]
-pub(super) fn to_pulses(radians: f32) -> i32 {
-    let pulses = radians * (PULSES_PER_TURN as f32 / TAU);
-    (pulses + 0.5_f32.copysign(pulses)) as i32
+    /// Returns the next frame to write.
+    pub(super) fn next_write(&mut self, now: Instant) -> Command {
+        if !self.driven {
+            self.stopped = now;
+            return Command::DISABLE;
+        }
+        // In turns, so that no register waits for endless changes of another.
+        let first = self.pending & self.ahead;
+        let waiting = if first == 0 { self.pending } else { first };
+        let bit = waiting & waiting.wrapping_neg();
+        self.pending &= !bit;
+        self.ahead = bit.wrapping_neg() << 1;
+        let register = Register::SEQUENCE.get(bit.trailing_zeros() as usize);
+        let register = *register.unwrap_or(&Register::Position);
+        Command::Write(register, self.value(register))
+    }
+
+    const fn value(&self, register: Register) -> i32 {
+        match register {
+            Register::Mode => self.settings.mode,
+            Register::Current => self.settings.current,
+            Register::Acceleration => self.settings.acceleration,
+            Register::Deceleration => self.settings.deceleration,
+            Register::Speed => self.speed,
+            Register::Enable => 1,
+            Register::Position | Register::ActualPosition | Register::ActualSpeed => self.target,
+        }
+    }
+
+    /// Takes back a write that was not sent: its turn comes again, and then the turns of the registers behind it. Registers before it in
+    /// the sequence keep their places.
+    pub(super) fn take_back(&mut self, register: Register) {
+        self.ahead |= self.renew(register).wrapping_neg();
+    }
+
+    /// Marks a register for a write; returns its bit.
+    fn renew(&mut self, register: Register) -> u8 {
+        let place = Register::SEQUENCE.iter().position(|other| *other == register);
+        let bit = place.map_or(0, |place| 1 << place);
+        self.pending |= bit;
+        bit
+    }
 }

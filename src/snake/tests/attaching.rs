@@ -20,7 +20,7 @@ fn ids_and_parameters_that_make_no_sense_are_named() {
     assert_eq!(refused(no_window), "snake joint #1: stall window is not usable");
     assert_eq!(refused(Config::new(1).with_current(0)), "snake joint #1: current is not usable");
     joints.attach(Config::new(1)).unwrap();
-    assert_eq!(joints.attach(Config::new(1)), Err(AttachError::Taken(slot::name(1))));
+    assert_eq!(joints.attach(Config::new(1)), Err(AttachError::Taken(model::name(1))));
     assert_eq!(joints.joints().count(), 1);
 }
 
@@ -43,5 +43,5 @@ fn a_detached_joint_is_disabled_once_and_its_handle_finds_nothing() {
     }
     let last = bench.joints.joints().next().unwrap().0;
     bench.joints.detach(last);
-    assert_eq!(bench.joints.attach(Config::new(1)), Err(AttachError::WornOut(slot::name(1))));
+    assert_eq!(bench.joints.attach(Config::new(1)), Err(AttachError::WornOut(model::name(1))));
 }
