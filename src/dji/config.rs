@@ -100,6 +100,7 @@ impl<M: Model> Config<M> {
     /// let mut bus = Bus::new();
     /// assert!(bus.attach(Config::<M3508>::new(1).speed_loop(speed)).is_ok());
     /// ```
+    #[must_use]
     pub const fn speed_loop(mut self, speed: PidConfig) -> Self {
         self.plain.speed = Some(speed);
         self
