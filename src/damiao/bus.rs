@@ -1,8 +1,8 @@
 //! The motor as an own motor: its claims, its frames, and their order.
 
-use super::command::{CLEAR_ERROR, Command, REGISTERS, inquiry, refresh};
+use super::codec::{CLEAR_ERROR, Command, REGISTERS, inquiry, refresh};
+use super::codec::{is_answer, value};
 use super::config::Mode;
-use super::feedback::{is_answer, value};
 use super::{Feedback, Model, Register, Status};
 use crate::error::ConfigError;
 use crate::frame::{CanFrame, standard_id};

@@ -1,6 +1,6 @@
 //! The control mode, with its parameters.
 
-use super::command::{Command, MOST_VELOCITY};
+use super::codec::{Command, MOST_VELOCITY};
 use super::{Feedback, Model};
 use crate::error::ConfigError;
 use crate::motor::{ControlMode, Goal, ImpedanceControl, Order, inside};

@@ -51,15 +51,13 @@
 //! turn.
 
 mod bus;
-mod command;
+mod codec;
 mod config;
-mod feedback;
 mod model;
 #[cfg(test)]
 mod tests;
 
 pub use bus::Motor;
-pub use command::Command;
+pub use codec::{Command, Feedback, Status};
 pub use config::Mode;
-pub use feedback::{Feedback, Status};
 pub use model::{Model, Register};

@@ -1,8 +1,8 @@
 //! Attaching, arming and detaching of motors, the conditions that forbid arming, and the load of the bus.
 
-use super::command::{Outbox, Place};
 use super::config::PlainConfig;
 use super::motors::{FIRST_FEEDBACK_ID, Key, Motors};
+use super::outbox::{Outbox, Place};
 use super::slot::config::configured;
 use super::slot::{Slot, health};
 use super::{AttachError, Facts};

@@ -1,6 +1,6 @@
 use super::attach::Budget;
-use super::command::Outbox;
 use super::motors::{FIRST_FEEDBACK_ID, IDS, Key, Motors, is_of_others};
+use super::outbox::Outbox;
 use super::watch::{Counters, Rejects};
 use super::{AnyHandle, AttachError, Config, Feedback, Handle, Model, attach, watch};
 use crate::frame::CanFrame;

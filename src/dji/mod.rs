@@ -170,15 +170,13 @@
 
 mod attach;
 mod bus;
-mod command;
+mod codec;
 mod config;
 mod device;
 mod error;
-mod feedback;
-mod limit;
-mod measured;
 mod model;
 mod motors;
+mod outbox;
 mod slot;
 mod targets;
 #[cfg(test)]
@@ -186,10 +184,10 @@ mod tests;
 mod watch;
 
 pub use bus::Bus;
-pub use command::CommandFrame;
+pub use codec::{ErrorCode, Feedback, State};
 pub use config::{Config, WordGains};
 pub use error::{AttachError, Message};
-pub use feedback::{ErrorCode, Feedback, State};
 pub use model::{Facts, Gm6020Current, Gm6020Voltage, M2006, M3508, Model};
 pub use motors::{AnyHandle, Handle};
+pub use outbox::CommandFrame;
 pub use watch::Counters;

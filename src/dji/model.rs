@@ -1,6 +1,6 @@
 use super::CommandFrame;
-use super::command::to_raw;
-use super::feedback::ErrorTable;
+use super::codec::ErrorTable;
+use super::codec::to_raw;
 use crate::encoder::GearRatio;
 use crate::motor::Capability;
 use crate::units::{Current, Voltage};

@@ -1,11 +1,13 @@
 //! Motors of a bus in their slots, and the handles of motors.
 
+use super::outbox::Outbox;
 use super::slot::Slot;
 use super::watch::Rounds;
 use super::{CommandFrame, Model};
 use crate::frame::CanFrame;
-use crate::motor::{DeviceGuard, TargetError};
+use crate::motor::{DeviceGuard, LONGEST_PAUSE, TargetError};
 use crate::time::Instant;
+use crate::units::{Angle, AngularVelocity};
 use core::marker::PhantomData;
 
 /// The lowest feedback id, and the number of feedback ids: 0x201..=0x20B.
@@ -210,6 +212,54 @@ impl<const N: usize> Motors<N> {
             self.change(index, now, &change);
         }
     }
+
+    /// Sets the remaining way and the rate of a motor, both measured by another sensor at the time `at`.
+    pub(super) fn set_measured(
+        &mut self,
+        motor: Key,
+        way: Angle,
+        velocity: AngularVelocity,
+        at: Instant,
+    ) -> Result<(), TargetError> {
+        let guard = &self.guard;
+        let (now, updated, timeouts) = (guard.now(), guard.updated(), *guard.timeouts());
+        // A 32-bit stamp alone would be fresh again every 71 minutes.
+        let is_ahead = guard.is_running() && at.since(updated) > LONGEST_PAUSE;
+        let is_far = is_ahead || updated.since(at) > timeouts.measured();
+        let at = (!is_far).then(|| at.stamp());
+        self.change_present(motor, |slot| {
+            slot.set_measured(way.as_radians(), velocity.as_rad_per_s(), at, now, &timeouts)
+        })?;
+        // A measured target expires sooner than others.
+        self.guard.disturb();
+        Ok(())
+    }
+
+    /// Scales the command of a motor by a factor; see [`Bus::scale_outputs`](super::Bus::scale_outputs).
+    pub(super) fn scale_output(&mut self, outbox: &mut Outbox, motor: Key, factor: f32) {
+        let Some(slot) = self.get_mut(motor) else { return };
+        let before = outbox.get(slot.place);
+        let after = cut(before, factor);
+        if after != before {
+            outbox.put(slot.place, after);
+            // Meanwhile the loop must not wind up.
+            let passed = slot.in_units(after);
+            slot.speed_loop_mut().keep_integral_within(passed);
+        }
+    }
+}
+
+/// Returns the command scaled by a factor: never larger than before, never of the other sign.
+const fn cut(raw: i16, factor: f32) -> i16 {
+    if factor >= 1.0 {
+        return raw;
+    }
+    if factor > 0.0 {
+        #[expect(clippy::cast_possible_truncation, reason = "rounds towards zero, within raw")]
+        let less = (raw as f32 * factor) as i16;
+        return less;
+    }
+    0
 }
 
 #[cfg(target_pointer_width = "32")]
@@ -321,5 +371,36 @@ impl<B> Eq for AnyHandle<B> {}
 impl<B> core::fmt::Debug for AnyHandle<B> {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         write!(f, "AnyHandle(slot {})", self.key.index())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn nothing_is_raised_or_turned_around(raw in any::<i16>(), factor in any::<f32>()) {
+            let after = cut(raw, factor);
+            prop_assert!(after.unsigned_abs() <= raw.unsigned_abs(), "{raw} {factor} {after}");
+            prop_assert!(after == 0 || (after < 0) == (raw < 0), "{raw} {factor} {after}");
+        }
+
+        #[test]
+        fn what_is_left_is_the_share_to_a_count(raw in any::<i16>(), factor in 0.0_f32..1.0) {
+            let share = f32::from(raw) * factor;
+            prop_assert!((f32::from(cut(raw, factor)) - share).abs() <= 1.0);
+        }
+    }
+
+    #[test]
+    fn a_factor_that_is_no_share_takes_all_or_nothing() {
+        for factor in [f32::NAN, f32::NEG_INFINITY, -1.0, -0.0, 0.0] {
+            assert_eq!(cut(-12_345, factor), 0);
+        }
+        for factor in [1.0, 1.5, f32::INFINITY] {
+            assert_eq!((cut(-12_345, factor), cut(i16::MIN, factor)), (-12_345, i16::MIN));
+        }
     }
 }

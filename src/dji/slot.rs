@@ -7,10 +7,11 @@ pub(super) mod gap;
 pub(super) mod health;
 mod target;
 
-use super::command::{Outbox, Place, free_to_raw, loop_to_raw, saturate};
+use super::codec::{free_to_raw, loop_to_raw, saturate};
 use super::config::USUAL;
 use super::model::Range;
 use super::motors::Key;
+use super::outbox::{Outbox, Place};
 use super::{Facts, Feedback, State};
 use crate::control::{ErrorPid, Pid, PidConfig};
 use crate::encoder::{GearRatio, Homing, Position, Shaft, shortest};

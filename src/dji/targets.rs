@@ -1,7 +1,7 @@
 //! Functions of an application: state, health, arming, targets.
 
 use super::slot::{DETACHED, config, gap, health};
-use super::{AnyHandle, Bus, Handle, Model, State, attach, limit, measured, watch};
+use super::{AnyHandle, Bus, Handle, Model, State, attach, watch};
 use crate::control::PidConfig;
 use crate::encoder::Position;
 use crate::error::ConfigError;
@@ -352,7 +352,7 @@ impl<B, const N: usize> Bus<B, N> {
         measured: Measured<Angle>,
     ) -> Result<(), TargetError> {
         let way = measured.way_to(target);
-        measured::set(&mut self.motors, motor.into().key(), way, measured.velocity, measured.at)
+        self.motors.set_measured(motor.into().key(), way, measured.velocity, measured.at)
     }
 
     /// Sets the multi-turn position for the position loop, measured by another sensor.
@@ -366,7 +366,7 @@ impl<B, const N: usize> Bus<B, N> {
         measured: Measured<Position>,
     ) -> Result<(), TargetError> {
         let way = measured.way_to(target);
-        measured::set(&mut self.motors, motor.into().key(), way, measured.velocity, measured.at)
+        self.motors.set_measured(motor.into().key(), way, measured.velocity, measured.at)
     }
 
     /// Returns the commanded current of the last update, as on the wire; `None` for a detached motor.
@@ -394,7 +394,7 @@ impl<B, const N: usize> Bus<B, N> {
     ) {
         for motor in motors {
             let motor: AnyHandle<B> = motor.into();
-            limit::scale_output(&mut self.motors, &mut self.outbox, motor.key(), factor);
+            self.motors.scale_output(&mut self.outbox, motor.key(), factor);
         }
     }
 }

@@ -4,8 +4,8 @@
 //! * time: ages that exceed their limits, keep-alives, updates without a usable step;
 //! * checks of one motor a tick, in rounds.
 
-use super::command::Outbox;
 use super::motors::{FIRST_FEEDBACK_ID, IDS, Motors};
+use super::outbox::Outbox;
 use super::slot::{Slot, Surroundings, gap, health};
 use super::{CommandFrame, Feedback};
 use crate::frame::CanFrame;

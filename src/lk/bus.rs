@@ -1,6 +1,6 @@
 //! The motor as an own motor: its claims, its frames, and their order.
 
-use super::command::{id_of, is_command};
+use super::codec::{id_of, is_command};
 use super::config::Mode;
 use super::model::{MOST_COUNTS, RAD_PER_DEGREE};
 use super::{Command, Feedback, Model, State};

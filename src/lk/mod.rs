@@ -77,15 +77,13 @@
 //! off.
 
 pub(crate) mod bus;
-pub(crate) mod command;
+pub(crate) mod codec;
 pub(crate) mod config;
-mod feedback;
 pub(crate) mod model;
 #[cfg(test)]
 mod tests;
 
 pub use bus::Motor;
-pub use command::Command;
+pub use codec::{Command, Feedback, State};
 pub use config::Mode;
-pub use feedback::{Feedback, State};
 pub use model::{Model, Series};

@@ -77,14 +77,12 @@
 //! of a remote frame: here the length of the message. Extended ids are not supported. Never tried on a drive.
 
 mod bus;
-mod command;
+mod codec;
 mod config;
-mod feedback;
 mod model;
 #[cfg(test)]
 mod tests;
 
-pub use command::Command;
+pub use codec::{Command, Feedback, Firmware, Heartbeat};
 pub use config::{Endpoints, Mode, Motor};
-pub use feedback::{Feedback, Firmware, Heartbeat};
 pub use model::Model;

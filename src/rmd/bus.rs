@@ -4,7 +4,7 @@ use super::model::AMPERES_PER_COUNT;
 use super::{Command, Feedback, Motor, State};
 use crate::frame::CanFrame;
 use crate::lk::bus::{SILENT, whole};
-use crate::lk::command::{id_of, is_command};
+use crate::lk::codec::{id_of, is_command};
 use crate::lk::model::RAD_PER_DEGREE;
 use crate::motor::{
     Capabilities, Capability, Claim, Goal, Ingest, Malformed, MotorName, Order, OwnMotor,

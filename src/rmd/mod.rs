@@ -89,14 +89,12 @@
 //! with zeros where its text says that the frame is sent back: such a drive is refused.
 
 mod bus;
-mod command;
+mod codec;
 mod config;
-mod feedback;
 mod model;
 #[cfg(test)]
 mod tests;
 
-pub use command::Command;
+pub use codec::{Command, Feedback, State};
 pub use config::{Mode, Motor};
-pub use feedback::{Feedback, State};
 pub use model::Model;

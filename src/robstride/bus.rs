@@ -1,8 +1,8 @@
 //! The motor as an own motor: its claims, its frames, and their order.
 
-use super::command::Command;
+use super::codec::Command;
+use super::codec::{FAULTS, VALUE, answer, register};
 use super::config::Mode;
-use super::feedback::{FAULTS, VALUE, answer, register};
 use super::{Feedback, Model, Register, Status};
 use crate::error::{ConfigError, check};
 use crate::frame::{CanFrame, extended_id};

@@ -1,6 +1,6 @@
 //! The run mode, with its parameters.
 
-use super::command::Command;
+use super::codec::Command;
 use super::{Model, Register};
 use crate::error::ConfigError;
 use crate::motor::{ControlMode, Goal, ImpedanceControl, Order, Preparation, Shaft, Told, inside};

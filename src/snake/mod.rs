@@ -81,10 +81,9 @@
 //! that lost its enable is detected only by its position.
 
 mod bus;
-mod command;
+mod codec;
 mod config;
 mod device;
-mod feedback;
 mod model;
 mod schedule;
 mod slot;
@@ -93,9 +92,8 @@ mod targets;
 mod tests;
 
 pub use bus::Joints;
-pub use command::Command;
+pub use codec::{Command, Reply, State};
 pub use config::{AttachError, Config};
-pub use feedback::{Reply, State};
 pub use model::{IDS, PULSES_PER_TURN, Register};
 pub use schedule::Counters;
 pub use targets::Joint;

@@ -1,8 +1,8 @@
 //! The motor as an own motor: its claims, its frames, and their order.
 
-use super::command::{HOST, SHORT_MESSAGE, extended, question};
+use super::codec::fault;
+use super::codec::{HOST, SHORT_MESSAGE, extended, question};
 use super::config::{At, Mode, Rest};
-use super::feedback::fault;
 use super::{Feedback, Model};
 use crate::encoder;
 use crate::error::ConfigError;

@@ -1,7 +1,7 @@
 //! The control mode, with its parameters.
 
 use super::Model;
-use super::command::Command;
+use super::codec::Command;
 use crate::control::{Pid, PidConfig};
 use crate::error::ConfigError;
 use crate::math::wrap_tau;

@@ -77,15 +77,13 @@
 //! without an answer to the question for the fault needs [`Motor::without_fault_code`].
 
 mod bus;
-mod command;
+mod codec;
 mod config;
-mod feedback;
 mod model;
 #[cfg(test)]
 mod tests;
 
 pub use bus::Motor;
-pub use command::Command;
+pub use codec::{Command, Feedback};
 pub use config::{Mode, Rest};
-pub use feedback::Feedback;
 pub use model::Model;

@@ -1,6 +1,6 @@
 //! Facts of the models and the codec of registers.
 
-use super::command::inquiry;
+use super::codec::inquiry;
 use super::*;
 use crate::motor::Inquiry;
 use crate::wire::mit::Ranges;

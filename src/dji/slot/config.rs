@@ -2,11 +2,12 @@
 
 use super::{NO_GAINS, Slot};
 use crate::control::{ErrorPid, Pid, PidConfig};
-use crate::dji::command::{Place, to_raw};
+use crate::dji::codec::ErrorTable;
+use crate::dji::codec::to_raw;
 use crate::dji::config::PlainConfig;
 use crate::dji::error::SteepGain;
-use crate::dji::feedback::ErrorTable;
 use crate::dji::model::Range;
+use crate::dji::outbox::Place;
 use crate::dji::{AttachError, Facts};
 use crate::encoder::{COUNTS_PER_TURN, Homing, Shaft};
 use crate::error::ConfigError;

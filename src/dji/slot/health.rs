@@ -2,7 +2,7 @@
 
 use super::{Slot, coarse};
 use crate::dji::Facts;
-use crate::dji::command::to_raw;
+use crate::dji::codec::to_raw;
 use crate::dji::model::Range;
 use crate::encoder::Homing;
 use crate::motor::{Condition, Conditions, Health, HealthConfig, Link, Monitor, Sample, age};

@@ -2,8 +2,9 @@
 
 use super::{Goal, Slot, health, needs};
 use crate::control::Pid;
-use crate::dji::command::{Outbox, saturate, to_raw};
+use crate::dji::codec::{saturate, to_raw};
 use crate::dji::model::Range;
+use crate::dji::outbox::Outbox;
 use crate::encoder::Position;
 use crate::motor::{Link, MotorGuard, Rest, TargetError, Timeouts};
 use crate::time::TimeStep;

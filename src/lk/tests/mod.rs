@@ -36,7 +36,7 @@ fn a_current_beyond_the_range_is_its_end() {
 /// Commands that are read back are no feedback, and feedback at another temperature than 0 °C is none of them.
 #[test]
 fn a_command_reads_like_a_command_and_feedback_does_not() {
-    use super::command::is_command;
+    use super::codec::is_command;
     for command in [
         Command::Off,
         Command::Run,

@@ -1,7 +1,7 @@
 //! The codecs, with bytes of the protocol's documentation.
 
-use super::command::{endpoint, request};
-use super::feedback::endpoint_value;
+use super::codec::endpoint_value;
+use super::codec::{endpoint, request};
 use super::*;
 use crate::motor::{Form, Inquiry, lowest_bit};
 

@@ -1,6 +1,6 @@
 //! Facts of the models and the codecs.
 
-use super::feedback::{FAULTS, VALUE, answer, register};
+use super::codec::{FAULTS, VALUE, answer, register};
 use super::*;
 use crate::motor::Impedance;
 use crate::wire::mit;

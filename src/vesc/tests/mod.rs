@@ -117,13 +117,13 @@ fn frames_of_other_drives_and_with_other_ids_are_not_its_own() {
 #[test]
 fn only_the_answer_to_our_own_question_has_a_fault_code() {
     let answer = [23, 1, 50, 0, 0, 0x80, 0, 4];
-    assert_eq!(feedback::fault(&answer, 23), Some(4));
+    assert_eq!(codec::fault(&answer, 23), Some(4));
     for place in 0..7 {
         let mut other = answer;
         other[place] ^= 1;
-        assert_eq!(feedback::fault(&other, 23), None, "{other:?}");
+        assert_eq!(codec::fault(&other, 23), None, "{other:?}");
     }
     for length in 0..8 {
-        assert_eq!(feedback::fault(&answer[..length], 23), None);
+        assert_eq!(codec::fault(&answer[..length], 23), None);
     }
 }

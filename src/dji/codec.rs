@@ -1,3 +1,6 @@
+//! The codec: values to words of command frames, and feedback frames to values.
+
+use super::model::Range;
 use crate::encoder::{Homing, Position};
 use crate::frame::CanFrame;
 use crate::motor::{Conditions, Link, MotorName, Severity};
@@ -245,6 +248,69 @@ pub struct State {
     pub feedback: Feedback,
 }
 
+/// Converts a command to the nearest value on the wire, saturated at ±`limit`; NaN gives 0.
+///
+/// Odd-symmetric: `to_raw(-x) == -to_raw(x)` for every `x` except NaN.
+#[inline]
+pub(super) const fn to_raw(value: f32, raw_per_unit: f32, limit: i16) -> i16 {
+    let scaled = value * raw_per_unit;
+    #[expect(clippy::cast_possible_truncation, reason = "saturates, NaN gives 0")]
+    let halves = (scaled + scaled) as i32;
+    // Half of the value, ties away from zero: the shift rounds down, which is away from zero for negative values.
+    saturate((halves >> 1) + (halves & !(halves >> 31) & 1), Range::within(limit))
+}
+
+/// From 2^23 to 2^24, floats are exactly the whole numbers: a sum with this value is rounded, and its last bits count from here.
+const WHOLE: f32 = 1.5 * 8_388_608.0;
+
+/// As [`to_raw`], for the output of a loop in every update. Half a count is rounded to the even neighbour.
+#[inline(always)]
+pub(super) const fn loop_to_raw(value: f32, raw_per_unit: f32, range: Range) -> i16 {
+    let sum = value * raw_per_unit + WHOLE;
+    let raw = sum.to_bits().wrapping_sub(WHOLE.to_bits()).cast_signed();
+    if !range.contains(raw) {
+        return beyond(value, raw_per_unit, range);
+    }
+    #[expect(clippy::cast_possible_truncation, reason = "within the range")]
+    let raw = raw as i16;
+    raw
+}
+
+/// As [`loop_to_raw`], for an output within the motor's limit, and so within 16 bits.
+#[inline]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "within 16 bits, and the last bits count from zero"
+)]
+pub(super) const fn free_to_raw(value: f32, raw_per_unit: f32) -> i16 {
+    (value * raw_per_unit + WHOLE).to_bits() as i16
+}
+
+/// Cold path of [`loop_to_raw`], also for NaN and for values too large for the sum.
+#[cold]
+#[inline(never)]
+const fn beyond(value: f32, raw_per_unit: f32, range: Range) -> i16 {
+    range.nearest(to_raw(value, raw_per_unit, i16::MAX) as i32)
+}
+
+/// Limits a raw command.
+#[inline(always)]
+pub(super) const fn saturate(raw: i32, range: Range) -> i16 {
+    if !range.contains(raw) {
+        return at_the_limit(raw, range);
+    }
+    #[expect(clippy::cast_possible_truncation, reason = "within the range")]
+    let raw = raw as i16;
+    raw
+}
+
+/// Cold path of [`saturate`].
+#[cold]
+#[inline(never)]
+const fn at_the_limit(raw: i32, range: Range) -> i16 {
+    range.nearest(raw)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -331,6 +397,48 @@ mod tests {
             prop_assert_eq!(feedback.rpm(), i16::from_be_bytes([a, b]));
             prop_assert_eq!(feedback.current(), i16::from_be_bytes([c, d]));
             prop_assert_eq!((feedback.temperature(), feedback.error()), (e, f));
+        }
+    }
+
+    #[test]
+    fn ties_of_a_loop_go_to_the_even_neighbour() {
+        for (value, raw) in [(0.5, 0), (1.5, 2), (2.5, 2), (-0.5, 0), (-1.5, -2), (-2.5, -2)] {
+            assert_eq!(loop_to_raw(value, 1.0, Range::within(100)), raw, "{value}");
+            assert_eq!(free_to_raw(value, 1.0), raw, "{value}");
+        }
+    }
+
+    #[test]
+    fn ties_of_rounding_go_away_from_zero_and_nan_is_zero() {
+        for (value, raw) in [(0.5, 1), (-0.5, -1), (0.49, 0), (-0.0, 0), (f32::NAN, 0), (1e-40, 0)]
+        {
+            assert_eq!(to_raw(value, 1.0, 100), raw, "{value}");
+        }
+    }
+
+    proptest! {
+        /// Law: saturated, odd-symmetric and monotonic, for any bits.
+        #[test]
+        fn to_raw_saturates_symmetrically(a in any::<f32>(), b in any::<f32>(), limit in 0_i16..=i16::MAX, scale in -2000.0_f32..2000.0) {
+            let raw = |value| to_raw(value, scale, limit);
+            prop_assert!(raw(a).unsigned_abs() <= limit.unsigned_abs());
+            prop_assert_eq!(raw(-a), -raw(a));
+            if a <= b {
+                let (low, high) = if scale >= 0.0 { (raw(a), raw(b)) } else { (raw(b), raw(a)) };
+                prop_assert!(low <= high);
+            }
+        }
+
+        /// Law: a loop's output goes to the nearest number too, and is limited the same way.
+        #[test]
+        fn loop_to_raw_is_to_raw_but_for_ties(value in any::<f32>(), near in -40_000.0_f32..40_000.0, limit in 0_i16..=i16::MAX, scale in -2000.0_f32..2000.0) {
+            for value in [value, near / scale, near.round() / scale, (near.round() + 0.5) / scale] {
+                let range = Range::within(limit);
+                let (raw, other) = (loop_to_raw(value, scale, range), to_raw(value, scale, limit));
+                let is_tie = (value * scale).fract().abs().to_bits() == 0.5_f32.to_bits();
+                prop_assert!(raw == other || is_tie && raw % 2 == 0 && raw.abs_diff(other) == 1, "{} {} {}", value, raw, other);
+                prop_assert_eq!(loop_to_raw(-value, scale, range), -raw);
+            }
         }
     }
 }
