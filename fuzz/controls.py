@@ -207,7 +207,7 @@ DEFECTS = [
      "                self.give_up(1);\n            }\n        }\n    }", "                self.give_up(total);\n            }\n        }\n    }"),
     ("wire_host_link", "the checksum is not looked at", "src/wire/host_link.rs",
      "if CRC.checksum(body) == u16::from_be_bytes(*crc) {", "if CRC.checksum(body) == u16::from_be_bytes(*crc) || true {"),
-    ("wire_host_link", "an angle that is no number is refused", "src/wire/host_link/telemetry.rs",
+    ("wire_host_link", "an angle that is no number is refused", "src/wire/host_link.rs",
      "format.read(check(frame)?).ok_or(Reject::Length)", "format.read(check(frame)?).filter(|telemetry| telemetry.imu_angles_deg.as_flattened().iter().all(|angle| angle.is_finite())).ok_or(Reject::Content)"),
     ("wire_referee", "a limit rises with the first frame", "src/wire/referee/receiver.rs",
      "holds.then_some(self.previous.min(self.latest))", "holds.then_some(self.latest)"),

@@ -1,6 +1,5 @@
-use super::error::{check, positive};
 use super::number::{Sum, finite};
-use crate::error::ConfigError;
+use crate::error::{ConfigError, check, positive};
 use crate::math;
 use crate::time::TimeStep;
 

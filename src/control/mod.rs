@@ -47,7 +47,6 @@
 
 mod actuator;
 mod differentiator;
-pub(crate) mod error;
 mod filter;
 mod identification;
 mod matrix;

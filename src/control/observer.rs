@@ -1,6 +1,5 @@
-use super::error::{check, positive};
 use super::number::finite;
-use crate::error::ConfigError;
+use crate::error::{ConfigError, check, positive};
 use crate::time::TimeStep;
 
 /// Estimates speed and load torque of a motor from its feedback: an extended-state observer (Luenberger).

@@ -1,7 +1,6 @@
 //! The motor as an own motor: its claims, its frames, and their order.
 
-use super::codec::{CLEAR_ERROR, Command, REGISTERS, inquiry, refresh};
-use super::codec::{is_answer, value};
+use super::codec::{CLEAR_ERROR, Command, REGISTERS, inquiry, is_answer, refresh, value};
 use super::config::Mode;
 use super::{Feedback, Model, Register, Status};
 use crate::error::ConfigError;

@@ -5,8 +5,7 @@ use super::watch::{Counters, Rejects};
 use super::{AnyHandle, AttachError, Config, Feedback, Handle, Model, attach, watch};
 use crate::frame::CanFrame;
 use crate::motor::{BusLoad, Devices, Ingest, MotorName, Timeouts, Visitor};
-use crate::time::TimeStep;
-use crate::time::{Duration, Instant, Tick};
+use crate::time::{Duration, Instant, Tick, TimeStep};
 use core::marker::PhantomData;
 
 /// The motors of one CAN bus, their loops, and the frames for them.

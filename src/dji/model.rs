@@ -1,6 +1,5 @@
 use super::CommandFrame;
-use super::codec::ErrorTable;
-use super::codec::to_raw;
+use super::codec::{ErrorTable, to_raw};
 use crate::encoder::GearRatio;
 use crate::motor::Capability;
 use crate::units::{Current, Voltage};

@@ -23,14 +23,10 @@
 #[expect(clippy::float_cmp, reason = "exact results are the rule under test")]
 #[expect(clippy::cast_possible_truncation, reason = "f64 is the reference, f32 under test")]
 pub(crate) mod tests;
-mod wrap;
 
-pub(crate) use wrap::rest;
-pub use wrap::{wrap, wrap_pi, wrap_positive, wrap_tau};
-
-use core::f32::consts::FRAC_2_PI;
 #[cfg(any(test, not(feature = "micromath")))]
 use core::f32::consts::FRAC_PI_2;
+use core::f32::consts::{FRAC_2_PI, PI, TAU};
 
 /// Added to and taken from a number of at most 2^22, leaves the nearest integer: 1.5 * 2^23, whose last bit counts ones.
 const ROUND: f32 = 12_582_912.0;
@@ -193,4 +189,178 @@ const fn newton(x: f32) -> f32 {
         return x; // zero, infinity, NaN
     }
     if x <= f32::MIN_POSITIVE { quick_root(x * SCALE) / 4096.0 } else { quick_root(x) }
+}
+
+/// Returns the angle in [-π, π) of the same direction as `x`, both in radians.
+///
+/// The error is at most 4e-7 up to ±10 000 rad; beyond, the error is at most the spacing of `f32` at `x`. Past four
+/// million turns, where the spacing is a third of a turn, the result is some angle in the range. The ends are the `f32`
+/// nearest to ±π. NaN and infinity give NaN.
+///
+/// Costs 18 instructions on a Cortex-M4F (`docs/figures.md`).
+///
+/// # Examples
+/// ```
+/// use core::f32::consts::PI;
+/// use drivetrain::math::wrap_pi;
+///
+/// assert!((wrap_pi(1.5 * PI) + 0.5 * PI).abs() < 1e-6);
+/// assert_eq!(wrap_pi(PI), -PI);
+/// ```
+#[must_use]
+#[inline]
+pub const fn wrap_pi(x: f32) -> f32 {
+    // The upper part has 12 bits, so its product with up to 4096 turns is exact.
+    const UPPER: f32 = 6.283_203;
+    const LOWER: f32 = -1.781_782e-5;
+    let turns = (x * (1.0 / TAU) + ROUND) - ROUND;
+    let rest = x - turns * UPPER - turns * LOWER;
+    if rest.abs() < PI { rest } else { at_the_edge(rest, x) }
+}
+
+/// Returns the angle in [0, 2π) of the same direction as `x`, both in radians.
+///
+/// Errors, NaN and infinity as in [`wrap_pi`]. A result that rounding would put on 2π, such as a tiny negative angle,
+/// is 0.
+///
+/// # Examples
+/// ```
+/// use drivetrain::math::wrap_tau;
+///
+/// assert!((wrap_tau(-1.0) - 5.283_185_3).abs() < 1e-6);
+/// assert_eq!(wrap_tau(-1e-20), 0.0);
+/// ```
+#[must_use]
+#[inline]
+pub const fn wrap_tau(x: f32) -> f32 {
+    positive(wrap_pi(x), TAU)
+}
+
+/// Returns the value in [-`period`/2, `period`/2) that differs from `x` by whole periods.
+///
+/// Exact for every finite `x` and every normal `period`. Within one period, and within 4096 periods of at most 12 significant
+/// bits (360.0, 8192.0), wrapping takes one division; beyond, a division of integers for every 8 bits of the quotient, 36 at
+/// most. NaN and infinity give NaN, and so does a period of zero, a negative or an infinite period.
+///
+/// # Examples
+/// ```
+/// use drivetrain::math::wrap;
+///
+/// assert_eq!(wrap(10.0 - 350.0, 360.0), 20.0); // from 350 to 10 degrees is +20
+/// assert_eq!(wrap(350.0 - 10.0, 360.0), -20.0);
+/// assert_eq!(wrap(180.0, 360.0), -180.0);
+/// assert_eq!(wrap(1e10, 360.0), -80.0); // 27 777 778 turns less 80 degrees
+/// ```
+#[must_use]
+#[inline]
+pub const fn wrap(x: f32, period: f32) -> f32 {
+    // The product of two numbers of 12 bits has 24, as many as `f32`.
+    const LOWER_BITS: u32 = 0xFFF;
+    const MOST_TURNS: f32 = 4096.0;
+    let turns = (x / period + ROUND) - ROUND;
+    let rest = x - turns * period;
+    let exact_turns = if period.to_bits() & LOWER_BITS == 0 { MOST_TURNS } else { 1.0 };
+    if turns.abs() <= exact_turns && rest.abs() < 0.5 * period { rest } else { far(x, period) }
+}
+
+/// Returns the value of [`wrap`], to within the spacing of `f32` at `x`, if the value is within half a period, the ends
+/// not included; otherwise a value beyond. Fewer instructions than [`wrap`], for ways of a few periods.
+#[inline]
+pub(crate) const fn rest(x: f32, period: f32) -> f32 {
+    let turns = (x / period + ROUND) - ROUND;
+    x - turns * period
+}
+
+/// Returns the value in [0, `period`) that differs from `x` by whole periods.
+///
+/// NaN, infinity and bad periods as in [`wrap`]. The result is the `f32` nearest to the exact value; if the nearest is `period`
+/// itself, as for a tiny negative value, the result is 0.
+///
+/// # Examples
+/// ```
+/// use drivetrain::math::wrap_positive;
+///
+/// assert_eq!(wrap_positive(-90.0, 360.0), 270.0);
+/// assert_eq!(wrap_positive(-1e-20, 360.0), 0.0);
+/// ```
+#[must_use]
+#[inline]
+pub const fn wrap_positive(x: f32, period: f32) -> f32 {
+    positive(wrap(x, period), period)
+}
+
+const fn positive(wrapped: f32, period: f32) -> f32 {
+    let shifted = if wrapped < 0.0 { wrapped + period } else { wrapped };
+    if shifted >= period { 0.0 } else { shifted }
+}
+
+/// The half turn itself, a value rounded to the wrong side of it, and arguments too large to hold a remainder.
+#[cold]
+#[inline(never)]
+const fn at_the_edge(rest: f32, x: f32) -> f32 {
+    if !x.is_finite() {
+        return f32::NAN;
+    }
+    let near = if rest >= PI {
+        rest - TAU
+    } else if rest < -PI {
+        rest + TAU
+    } else {
+        rest
+    };
+    // Here `x` holds no remainder any more: the spacing of f32 is more than a turn.
+    if near >= -PI && near < PI { near } else { 0.0 }
+}
+
+/// [`wrap`] by long division of the significands, in digits of 8 bits.
+#[cold]
+#[inline(never)]
+const fn far(x: f32, period: f32) -> f32 {
+    const DIGIT: u32 = 8;
+    let half = 0.5 * period;
+    if !(half > 0.0 && period < f32::INFINITY && x.is_finite()) {
+        return f32::NAN;
+    }
+    let ((dividend, x_exponent), (divisor, exponent)) = (parts(x.abs()), parts(period));
+    let mut rest = x.abs();
+    if x_exponent >= exponent {
+        let mut digits = x_exponent - exponent;
+        let mut remainder = remainder(dividend, divisor);
+        while digits > 0 {
+            let shift = if digits < DIGIT { digits } else { DIGIT };
+            remainder = self::remainder(remainder << shift, divisor);
+            digits -= shift;
+        }
+        rest = scaled(remainder, exponent);
+    }
+    let rest = rest.copysign(x);
+    if rest >= half {
+        rest - period
+    } else if rest < -half {
+        rest + period
+    } else {
+        rest
+    }
+}
+
+/// Returns the significand of a positive number, of 24 bits, and the power of two of its last bit, plus 150.
+const fn parts(value: f32) -> (u32, u32) {
+    const HIDDEN: u32 = 1 << 23;
+    let (exponent, fraction) = (value.to_bits() >> 23, value.to_bits() & (HIDDEN - 1));
+    if exponent == 0 { (fraction, 1) } else { (fraction | HIDDEN, exponent) }
+}
+
+const fn remainder(dividend: u32, divisor: u32) -> u32 {
+    match dividend.checked_rem(divisor) {
+        Some(remainder) => remainder,
+        None => 0, // never: a period is above zero
+    }
+}
+
+/// Puts a number together again from its [`parts`].
+#[expect(clippy::cast_precision_loss, reason = "24 bits")]
+const fn scaled(significand: u32, exponent: u32) -> f32 {
+    // The power of two of 2^-149 to 2^-127 is no normal number.
+    let bits = if exponent > 23 { (exponent - 23) << 23 } else { 1 << (exponent - 1) };
+    significand as f32 * f32::from_bits(bits)
 }

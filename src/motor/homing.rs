@@ -1,6 +1,5 @@
-use crate::control::error::{not_negative, positive};
 use crate::encoder::Position;
-use crate::error::{ConfigError, check};
+use crate::error::{ConfigError, check, not_negative, positive};
 use crate::time::{Duration, Instant, Tick};
 use crate::units::{Angle, AngularVelocity};
 

@@ -58,9 +58,8 @@ pub use homing::{HomingStep, ShaftState, StopHoming};
 pub use link::{Link, Timeouts};
 pub use load::BusLoad;
 pub(crate) use own::{
-    ControlMode, Form, Goal, Laps, Preparation, Questions, Shaft, Tachometer, TimeoutUnits, Told,
-    TorqueLoops, code_from, ingest_eight, inside, lowest_bit, mit_model, models,
-    register_questions, registers,
+    ControlMode, Form, Goal, Preparation, Questions, Shaft, TimeoutUnits, Told, TorqueLoops,
+    code_from, ingest_eight, inside, lowest_bit, mit_model, models, register_questions, registers,
 };
 pub use own::{Impedance, ImpedanceControl, Inquiry, Order, Own, OwnMotor, Settings, Target};
 pub use safety::OPENING;

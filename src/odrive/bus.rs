@@ -1,10 +1,9 @@
 //! The motor as an own motor: its claims, its frames, and their order.
 
 use super::codec::{
-    ASK_ENDPOINT, COMMANDS, Command, ENDPOINT, ERRORS, ESTIMATES, HEARTBEAT, endpoint, id,
-    number_of, request,
+    ASK_ENDPOINT, COMMANDS, Command, ENDPOINT, ERRORS, ESTIMATES, HEARTBEAT, endpoint,
+    endpoint_value, id, number_of, request, words,
 };
-use super::codec::{endpoint_value, words};
 use super::{Feedback, Firmware, Heartbeat, Motor};
 use crate::frame::CanFrame;
 use crate::motor::{

@@ -3,8 +3,7 @@ use crate::motor::{
     ArmError, Capabilities, Capability, Condition, Conditions, Edge, Guard, Health, MotorName,
     OPENING, TargetError, Timeouts, VelocityDrive,
 };
-use crate::time::TimeStep;
-use crate::time::{Duration, Instant, Tick};
+use crate::time::{Duration, Instant, Tick, TimeStep};
 use crate::units::AngularVelocity;
 use embedded_hal::pwm::SetDutyCycle;
 

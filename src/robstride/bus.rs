@@ -1,14 +1,14 @@
 //! The motor as an own motor: its claims, its frames, and their order.
 
-use super::codec::Command;
-use super::codec::{FAULTS, VALUE, answer, register};
+use super::codec::{Command, FAULTS, VALUE, answer, register};
 use super::config::Mode;
 use super::{Feedback, Model, Register, Status};
+use crate::encoder::Laps;
 use crate::error::{ConfigError, check};
 use crate::frame::{CanFrame, extended_id};
 use crate::motor::{
-    Capabilities, Capability, Claim, Ingest, Inquiry, Laps, MotorName, Order, OwnMotor,
-    Preparation, Role, Settings, TimeoutUnits, Vitals, WrongSetting, code_from, ingest_eight,
+    Capabilities, Capability, Claim, Ingest, Inquiry, MotorName, Order, OwnMotor, Preparation,
+    Role, Settings, TimeoutUnits, Vitals, WrongSetting, code_from, ingest_eight,
     register_questions,
 };
 use crate::time::Duration;

@@ -1,5 +1,4 @@
-use super::can::Mailboxes;
-use super::can::{INTERMISSION_BITS, frame_bits};
+use super::can::{INTERMISSION_BITS, Mailboxes, frame_bits};
 use super::port::Ring;
 use crate::frame::CanFrame;
 use crate::time::Instant;

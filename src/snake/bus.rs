@@ -4,8 +4,7 @@ use super::slot::{Slot, health};
 use super::{AttachError, Command, Config, Joint, Reply, State};
 use crate::frame::CanFrame;
 use crate::motor::{BusLoad, DeviceGuard, Hold, Ingest, Link, Malformed, MotorName, Timeouts};
-use crate::time::TimeStep;
-use crate::time::{Duration, Instant, Tick};
+use crate::time::{Duration, Instant, Tick, TimeStep};
 use embedded_can::Frame;
 
 /// Upper bound on how long a stop may wait for an outstanding reply.

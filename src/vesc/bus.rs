@@ -1,15 +1,15 @@
 //! The motor as an own motor: its claims, its frames, and their order.
 
-use super::codec::fault;
-use super::codec::{HOST, SHORT_MESSAGE, extended, question};
+use super::codec::{HOST, SHORT_MESSAGE, extended, fault, question};
 use super::config::{At, Mode, Rest};
 use super::{Feedback, Model};
 use crate::encoder;
+use crate::encoder::Tachometer;
 use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::{
-    Capabilities, Capability, Claim, Ingest, Malformed, MotorName, Order, OwnMotor, Role,
-    Tachometer, Vitals, WrongSetting,
+    Capabilities, Capability, Claim, Ingest, Malformed, MotorName, Order, OwnMotor, Role, Vitals,
+    WrongSetting,
 };
 use crate::units::{Angle, AngularVelocity};
 use embedded_can::{Frame, Id};

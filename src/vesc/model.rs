@@ -1,8 +1,7 @@
 //! Facts of a motor, stated by the program: a VESC drives any motor.
 
-use crate::encoder::GearRatio;
+use crate::encoder::{GearRatio, Tachometer};
 use crate::error::ConfigError;
-use crate::motor::Tachometer;
 use crate::units::AngularVelocity;
 use core::f32::consts::TAU;
 

@@ -32,8 +32,7 @@
 
 use core::fmt::Write;
 
-use super::{Decode, EncodeError, Reject};
-use super::{Reader, Writer};
+use super::{Decode, EncodeError, Reader, Reject, Writer};
 
 /// The end of a frame: +infinity.
 const TAIL: [u8; 4] = [0x00, 0x00, 0x80, 0x7F];

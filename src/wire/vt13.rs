@@ -45,10 +45,8 @@
 //! its order otherwise, and one leaves key C out. **Not known:** a captured frame (the vectors are computed), and the rate of the
 //! frames: the drivers use a time-out of 100 ms, one of 500 ms.
 
-use super::Reader;
-use super::dbus::Keys;
-use super::dbus::{field, scaled};
-use super::{Decode, Reject, referee};
+use super::dbus::{Keys, field, scaled};
+use super::{Decode, Reader, Reject, referee};
 
 /// The length of a frame in bytes.
 pub const FRAME_LENGTH: usize = 21;

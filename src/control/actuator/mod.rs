@@ -13,10 +13,9 @@ mod position;
 
 pub use position::{Cascade, PositionActuator};
 
-use super::error::positive;
 use super::filter::LowPass;
 use crate::control::pid::{Pid, PidConfig};
-use crate::error::ConfigError;
+use crate::error::{ConfigError, positive};
 use crate::time::TimeStep;
 
 /// A speed loop with its filters.

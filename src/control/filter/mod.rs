@@ -14,9 +14,8 @@ mod window;
 
 pub use window::Window;
 
-use crate::control::error::{check, positive};
 use crate::control::number::finite;
-use crate::error::ConfigError;
+use crate::error::{ConfigError, check, positive};
 use crate::math;
 use crate::time::TimeStep;
 

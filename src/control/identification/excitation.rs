@@ -1,7 +1,6 @@
 use super::IdentificationError;
-use crate::control::error::{check, positive};
 use crate::control::number::{Sum, limited};
-use crate::error::ConfigError;
+use crate::error::{ConfigError, check, positive};
 use crate::time::TimeStep;
 
 /// Efforts for an [`Identification`](super::Identification): steps that swing the shaft within limits of effort, speed and way.

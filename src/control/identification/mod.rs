@@ -13,9 +13,8 @@ mod regression;
 pub use excitation::Excitation;
 pub use plant::Plant;
 
-use crate::control::error::{check, not_negative, positive};
 use crate::control::number::Sum;
-use crate::error::ConfigError;
+use crate::error::{ConfigError, check, not_negative, positive};
 use crate::math;
 use crate::time::TimeStep;
 use core::fmt;

@@ -1,7 +1,6 @@
-use crate::control::error::{check, not_negative, positive};
 use crate::control::pid::PidConfig;
 use crate::control::shaping::FeedForward;
-use crate::error::ConfigError;
+use crate::error::{ConfigError, check, not_negative, positive};
 use crate::math;
 use crate::units::Angle;
 use core::f32::consts::{FRAC_PI_2, PI};

@@ -1,10 +1,9 @@
-use crate::control::error::{finite, positive};
 use crate::control::motion::ascent::{Ascent, Beginning, Curve};
 use crate::control::motion::task::{self, Brake, Limits, Task};
 use crate::control::motion::{Motion, MotionTarget, Phases};
 use crate::control::number::{self, Wide, limited};
 use crate::control::shaping::{MotionLimits, ProfileState};
-use crate::error::ConfigError;
+use crate::error::{ConfigError, finite, positive};
 
 /// A task after braking, and the way back to units of the position and seconds.
 #[derive(Debug, Default, Clone, Copy, PartialEq)]

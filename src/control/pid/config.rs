@@ -1,7 +1,6 @@
-use crate::control::error::{
-    check, gains, not_negative, off_or_positive, ordered, output_ends, positive,
+use crate::error::{
+    ConfigError, check, gains, not_negative, off_or_positive, ordered, output_ends, positive,
 };
-use crate::error::ConfigError;
 
 const ASYMMETRIC: u16 = 1;
 const INTEGRAL_WEIGHT: u16 = 1 << 1;

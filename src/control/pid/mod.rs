@@ -7,9 +7,8 @@ mod law;
 pub use config::PidConfig;
 pub(crate) use error_pid::ErrorPid;
 
-use crate::control::error::{check, gains};
 use crate::control::number::{finite, limited};
-use crate::error::ConfigError;
+use crate::error::{ConfigError, check, gains};
 use crate::time::TimeStep;
 use config::{DERIVATIVE_ON_ERROR, INCREMENTAL, REST_DERIVATIVE, TRACK_OUTPUT, TRACKING};
 use law::{CLOSED, UNKNOWN, gate, limit_of, open_gate};

@@ -12,9 +12,8 @@ mod profile;
 
 pub use profile::{MotionLimits, Profile, ProfileState};
 
-use crate::control::error::{check, not_negative, positive};
 use crate::control::number::{finite, limited};
-use crate::error::ConfigError;
+use crate::error::{ConfigError, check, not_negative, positive};
 use crate::time::TimeStep;
 
 /// Limits the rate of rise and fall of a value.

@@ -1,6 +1,5 @@
-use crate::control::error::{check, finite, positive};
 use crate::control::number;
-use crate::error::ConfigError;
+use crate::error::{ConfigError, check, finite, positive};
 use crate::math;
 
 /// How fast a [`Profile`] may go.

@@ -65,11 +65,11 @@ mod tests;
 pub use observer::{KalmanFilter, LuenbergerObserver};
 pub use regulator::{GainSchedule, LinearQuadraticRegulator, PlantInversion};
 
-use crate::control::error;
 use crate::control::matrix::{
     Grid, Number, finite, identity, narrow, row_sum, stepped, sum, times, wide, with_diagonal,
 };
 use crate::control::number::Wide;
+use crate::error;
 use crate::error::ConfigError;
 
 /// A linear plant of `N` states and `M` inputs, in steps of constant duration: `x[k + 1] = A x[k] + B u[k]`.

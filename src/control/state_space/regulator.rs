@@ -1,11 +1,10 @@
 use super::{LinearSystem, riccati};
-use crate::control::error::{self, positive};
 use crate::control::matrix::{
     Grid, apply, finite, identity, is_finite, largest, narrow, paired, solved, times, transposed,
     wide,
 };
 use crate::control::number::{self, Wide, limited};
-use crate::error::ConfigError;
+use crate::error::{self, ConfigError, positive};
 
 /// Holds a plant at a reference with the least cost of errors and effort: a linear-quadratic regulator of `N` states, `M` inputs.
 ///

@@ -11,10 +11,9 @@ mod relay;
 
 pub use relay::{RelayTuner, TuningRule};
 
-use crate::control::error::{self, check, positive};
 use crate::control::number::{Sum, finite};
 use crate::control::pid::PidConfig;
-use crate::error::ConfigError;
+use crate::error::{self, ConfigError, check, positive};
 use crate::time::TimeStep;
 
 /// A driven wheel of a robot, for the gains of its speed loop.

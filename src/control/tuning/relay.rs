@@ -1,7 +1,6 @@
-use crate::control::error::{check, finite, not_negative, positive};
 use crate::control::number::{self, Sum};
 use crate::control::pid::PidConfig;
-use crate::error::ConfigError;
+use crate::error::{ConfigError, check, finite, not_negative, positive};
 use crate::math;
 use crate::time::TimeStep;
 use core::f32::consts::PI;

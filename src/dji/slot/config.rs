@@ -2,8 +2,7 @@
 
 use super::{NO_GAINS, Slot};
 use crate::control::{ErrorPid, Pid, PidConfig};
-use crate::dji::codec::ErrorTable;
-use crate::dji::codec::to_raw;
+use crate::dji::codec::{ErrorTable, to_raw};
 use crate::dji::config::PlainConfig;
 use crate::dji::error::SteepGain;
 use crate::dji::model::Range;

@@ -1,5 +1,7 @@
 //! Tests, and sweeps for other modules.
 
+mod wrap;
+
 use super::*;
 use core::f32::consts::PI;
 use proptest::prelude::*;

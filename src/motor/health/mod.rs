@@ -21,7 +21,6 @@
 //!
 //! A motor of your own and a motor without CAN are checked in each of their updates for errors, and each 8 ms for the rest.
 
-mod condition;
 mod config;
 mod edge;
 mod monitor;
@@ -30,7 +29,6 @@ mod traffic;
 use super::{Link, MotorName};
 use crate::time::Duration;
 
-pub use condition::{Condition, Conditions};
 pub use config::{HealthConfig, Reaction};
 pub use edge::Edge;
 pub(crate) use edge::{Journal, Latch};
@@ -124,5 +122,239 @@ impl core::fmt::Display for Health {
             self.forgotten_targets,
             self.ambiguous_gaps
         )
+    }
+}
+
+/// Abnormal condition of one motor.
+///
+/// | condition | holds while | the motor |
+/// |---|---|---|
+/// | [`Late`](Self::Late) | there is no fresh feedback | is safe, and goes on by itself |
+/// | [`Offline`](Self::Offline) | the motor is lost, until ten good frames in a row | is relaxed |
+/// | [`PositionUncertain`](Self::PositionUncertain) | turns may have been missed, until the position is set | goes on |
+/// | [`Warning`](Self::Warning) | the ESC reports a warning | goes on |
+/// | [`Fault`](Self::Fault) | the ESC reports a fault | is relaxed |
+/// | [`Warm`](Self::Warm) | the motor is above its warning temperature | has less output |
+/// | [`Hot`](Self::Hot) | the motor is above its limit temperature | has no output |
+/// | [`Stalled`](Self::Stalled) | the motor is driven and does not turn | as configured; goes on |
+/// | [`Runaway`](Self::Runaway) | the motor sped up against its command, until armed | is relaxed |
+/// | [`Frozen`](Self::Frozen) | the feedback stands still in contradiction to itself | as configured; goes on |
+/// | [`Overspeed`](Self::Overspeed) | the reported speed is more than twice the speed without load | goes on |
+/// | [`DuplicateId`](Self::DuplicateId) | two motors answer with one id | is relaxed |
+/// | [`SoftLimit`](Self::SoftLimit) | the shaft is at or outside of a soft limit | turns inward only |
+/// | [`CommandLost`](Self::CommandLost) | the application let the target expire | is relaxed, until the next target |
+/// | [`SecondMaster`](Self::SecondMaster) | another node sends the command frame of the motor | as configured; goes on |
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+#[repr(u8)]
+pub enum Condition {
+    /// No fresh feedback.
+    Late,
+    /// The motor is lost.
+    Offline,
+    /// Rotor turns may have been missed.
+    PositionUncertain,
+    /// The ESC reports a warning.
+    Warning,
+    /// The ESC reports a fault.
+    Fault,
+    /// Above the warning temperature.
+    Warm,
+    /// Above the limit temperature.
+    Hot,
+    /// The motor is driven, and does not turn.
+    Stalled,
+    /// The motor speeds up without or against its command.
+    Runaway,
+    /// The feedback stands still in contradiction to itself.
+    Frozen,
+    /// More than twice the speed without load.
+    Overspeed,
+    /// Two motors answer with one id.
+    DuplicateId,
+    /// At or outside of a soft limit.
+    SoftLimit,
+    /// The target expired.
+    CommandLost,
+    /// Another node sends the command frame.
+    SecondMaster,
+    /// The last update did not lie after the one before: the clock stands or went back. The motor trips.
+    ClockFault,
+}
+
+impl Condition {
+    /// All conditions.
+    pub const ALL: [Self; 16] = [
+        Self::Late,
+        Self::Offline,
+        Self::PositionUncertain,
+        Self::Warning,
+        Self::Fault,
+        Self::Warm,
+        Self::Hot,
+        Self::Stalled,
+        Self::Runaway,
+        Self::Frozen,
+        Self::Overspeed,
+        Self::DuplicateId,
+        Self::SoftLimit,
+        Self::CommandLost,
+        Self::SecondMaster,
+        Self::ClockFault,
+    ];
+
+    /// Returns the condition in the words of a log line.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Late => "late",
+            Self::Offline => "offline",
+            Self::PositionUncertain => "position uncertain",
+            Self::Warning => "ESC warning",
+            Self::Fault => "ESC fault",
+            Self::Warm => "warm",
+            Self::Hot => "hot",
+            Self::Stalled => "stalled",
+            Self::Runaway => "runaway",
+            Self::Frozen => "frozen feedback",
+            Self::Overspeed => "overspeed",
+            Self::DuplicateId => "duplicate id",
+            Self::SoftLimit => "soft limit",
+            Self::CommandLost => "command lost",
+            Self::SecondMaster => "second master",
+            Self::ClockFault => "clock fault",
+        }
+    }
+
+    const fn bit(self) -> u16 {
+        1 << self as u8
+    }
+}
+
+impl core::fmt::Display for Condition {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(self.as_str())
+    }
+}
+
+/// A set of conditions, in 16 bits.
+///
+/// # Examples
+/// ```
+/// use drivetrain::motor::{Condition, Conditions};
+///
+/// let conditions = Conditions::NONE.with(Condition::Stalled).with(Condition::Warm);
+/// assert!(conditions.contains(Condition::Warm));
+/// assert_eq!(conditions.iter().count(), 2);
+/// assert_eq!(conditions.to_string(), "warm, stalled");
+/// assert_eq!(Conditions::NONE.to_string(), "healthy");
+/// ```
+#[derive(Default, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Conditions(u16);
+
+impl Conditions {
+    /// No condition: healthy.
+    pub const NONE: Self = Self(0);
+
+    /// Adds a condition.
+    #[must_use]
+    pub const fn with(self, condition: Condition) -> Self {
+        Self(self.0 | condition.bit())
+    }
+
+    /// Removes a condition.
+    #[must_use]
+    pub const fn without(self, condition: Condition) -> Self {
+        Self(self.0 & !condition.bit())
+    }
+
+    /// Tells whether a condition is in the set.
+    #[must_use]
+    pub const fn contains(self, condition: Condition) -> bool {
+        self.0 & condition.bit() != 0
+    }
+
+    /// Tells whether the set is empty.
+    #[must_use]
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// Iterates over the conditions, in the order of [`Condition::ALL`].
+    pub fn iter(self) -> impl Iterator<Item = Condition> {
+        let mut left = self.0;
+        core::iter::from_fn(move || {
+            // Above the last bit there is no condition.
+            let first = Condition::ALL.get(left.trailing_zeros() as usize)?;
+            left &= left.wrapping_sub(1);
+            Some(*first)
+        })
+    }
+
+    /// Returns the conditions in both sets.
+    pub(crate) const fn and(self, other: Self) -> Self {
+        Self(self.0 & other.0)
+    }
+
+    /// Returns the conditions in either set.
+    pub(crate) const fn or(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// Returns the conditions in this set and not in the other.
+    pub(crate) const fn minus(self, other: Self) -> Self {
+        Self(self.0 & !other.0)
+    }
+}
+
+impl core::fmt::Debug for Conditions {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_set().entries(self.iter()).finish()
+    }
+}
+
+/// Names the conditions in one line, separated by commas.
+impl core::fmt::Display for Conditions {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        if self.is_empty() {
+            return f.write_str("healthy");
+        }
+        for (index, condition) in self.iter().enumerate() {
+            write!(f, "{}{condition}", if index == 0 { "" } else { ", " })?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(feature = "defmt")]
+impl defmt::Format for Conditions {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        if self.is_empty() {
+            return defmt::write!(f, "healthy");
+        }
+        for (index, condition) in self.iter().enumerate() {
+            let separator = if index == 0 { "" } else { ", " };
+            defmt::write!(f, "{=str}{=str}", separator, condition.as_str());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::string::ToString;
+
+    #[test]
+    fn each_condition_has_a_bit_and_a_name_of_its_own() {
+        let all = Condition::ALL.into_iter().fold(Conditions::NONE, Conditions::with);
+        assert_eq!(all.iter().count(), Condition::ALL.len());
+        for condition in Condition::ALL {
+            let others = all.without(condition);
+            assert!(!others.contains(condition) && others.iter().count() == 15);
+            assert!(!others.to_string().contains(condition.as_str()), "{condition}");
+        }
     }
 }

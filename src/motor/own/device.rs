@@ -4,8 +4,7 @@ use super::{Impedance, Order, Own, OwnMotor, Target};
 use crate::frame::CanFrame;
 use crate::math::wrap_pi;
 use crate::motor::{CanDevice, Claim, Edge, Ingest, Link, MotorName, Role, WrongSetting};
-use crate::time::TimeStep;
-use crate::time::{Duration, Instant, Tick};
+use crate::time::{Duration, Instant, Tick, TimeStep};
 use crate::units::Angle;
 use embedded_can::Frame;
 

@@ -9,7 +9,6 @@ mod questions;
 mod registers;
 mod route;
 mod settings;
-mod turns;
 
 pub use impedance::ImpedanceControl;
 pub(crate) use impedance::TorqueLoops;
@@ -23,8 +22,6 @@ pub(crate) use registers::{
     Form, code_from, lowest_bit, mit_model, models, register_questions, registers,
 };
 pub(crate) use settings::{Preparation, TimeoutUnits};
-
-pub(crate) use turns::{Laps, Tachometer};
 
 use super::{
     AngleDrive, BusLoad, CanDevice, Capabilities, Capability, Claim, Devices, Guard, Health,

@@ -1,7 +1,6 @@
 //! The codecs, with bytes of the protocol's documentation.
 
-use super::codec::endpoint_value;
-use super::codec::{endpoint, request};
+use super::codec::{endpoint, endpoint_value, request};
 use super::*;
 use crate::motor::{Form, Inquiry, lowest_bit};
 

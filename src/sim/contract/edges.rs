@@ -1,7 +1,6 @@
 //! Rules about the edges of the motors of a device.
 
-use super::Run;
-use super::{Outcome, Rule, Subject};
+use super::{Outcome, Rule, Run, Subject};
 use crate::motor::{
     ArmError, Claim, Condition, Conditions, Devices, Edge, Ingest, MotorName, Role,
 };

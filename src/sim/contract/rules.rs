@@ -1,5 +1,4 @@
-use super::{Outcome, Rule, Subject, Violation, edges};
-use super::{Output, Run};
+use super::{Outcome, Output, Rule, Run, Subject, Violation, edges};
 use crate::frame::CanFrame;
 use crate::motor::{ArmError, Claim, Devices, Ingest, Role, TargetError};
 use crate::time::Tick;

@@ -7,8 +7,7 @@
     reason = "fields of a frame, which wrap as the drive's do"
 )]
 
-use super::DriveShaft;
-use super::within;
+use super::{DriveShaft, within};
 use crate::frame::CanFrame;
 use embedded_can::{Frame, Id, StandardId};
 

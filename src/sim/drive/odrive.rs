@@ -3,8 +3,7 @@
 
 #![expect(clippy::cast_possible_truncation, reason = "fields of a frame, which saturate")]
 
-use super::DriveShaft;
-use super::{float, within};
+use super::{DriveShaft, float, within};
 use crate::frame::CanFrame;
 use crate::math::sqrt;
 use core::f64::consts::TAU;

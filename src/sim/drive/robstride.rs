@@ -6,8 +6,7 @@
     reason = "fields of a frame and parameters, which saturate"
 )]
 
-use super::DriveShaft;
-use super::{float, within};
+use super::{DriveShaft, float, within};
 use crate::frame::CanFrame;
 use embedded_can::{ExtendedId, Frame, Id};
 

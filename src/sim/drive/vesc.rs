@@ -5,8 +5,7 @@
     reason = "fields of a frame, which saturate, and a tachometer, which wraps"
 )]
 
-use super::DriveShaft;
-use super::within;
+use super::{DriveShaft, within};
 use crate::frame::CanFrame;
 use core::f64::consts::TAU;
 use embedded_can::{ExtendedId, Frame, Id};
