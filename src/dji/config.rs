@@ -88,7 +88,7 @@ impl<M: Model> Config<M> {
     /// The loop is limited to the motor's limit unless it has a lower output limit of its own. `attach` refuses a `kp` if the command for
     /// an error of one rpm of the rotor, the resolution of the feedback, exceeds the model's whole range: above 3667 A per rad/s for an
     /// M3508, 3438 for an M2006, 28.6 for a GM6020 in current mode, and 229 V per rad/s in voltage mode, each with its own gearbox.
-    /// [`WheelTuning`](crate::control::WheelTuning) computes gains for a wheel, [`WordGains`](super::WordGains) converts gains. Every
+    /// [`WheelTuning`](crate::control::WheelTuning) computes gains for a wheel, [`WordGains`] converts gains. Every
     /// option of a [`PidConfig`] works here, including the incremental form and a tracked setpoint.
     ///
     /// # Examples

@@ -8,7 +8,7 @@ use embedded_can::Frame;
 
 /// A device family on a CAN bus: the interface between its motors and the transport of their frames.
 ///
-/// [`Devices`](super::Devices) is the side of the caller: a runner, an async task, a test. A type with this trait implements
+/// [`Devices`] is the side of the caller: a runner, an async task, a test. A type with this trait implements
 /// `Devices` by a line, `visitor.visit(self)`.
 ///
 /// No method has a body here. A device with a missing method does not compile:

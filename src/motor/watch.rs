@@ -191,7 +191,7 @@ pub enum Severity {
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Vitals {
-    /// Its temperature in °C. Watched when its [`HealthConfig`](super::HealthConfig) has temperatures.
+    /// Its temperature in °C. Watched when its [`HealthConfig`] has temperatures.
     pub temperature_c: Option<i16>,
     /// Severity of the error reported by the ESC.
     pub error: Option<Severity>,

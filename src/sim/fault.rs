@@ -345,7 +345,7 @@ pub enum SimError {
     BusOff,
     /// Frames were missed because the receive queue was full. Reported once; the frames before are still there.
     Overrun,
-    /// [`Fault::DriverErrors`](super::Fault::DriverErrors) makes the call of the driver fail.
+    /// [`Fault::DriverErrors`] makes the call of the driver fail.
     Scripted,
     /// A blocking call waited for a second.
     TimedOut,
