@@ -82,7 +82,7 @@ DEFECTS = [
      "let stands = passed >= self.limit;", "let stands = passed == u32::MAX;"),
     ("runner", "a bus that was lost asks for no new request", "src/runner/mod.rs",
      "self.device.trip();", "self.device.disarm();"),
-    ("controllers", "NaN passes", "src/time/step.rs",
+    ("controllers", "NaN passes", "src/time/ticker.rs",
      "let admitted = finite && !self.is_hold();", "let admitted = (finite || true) && !self.is_hold();"),
     ("controllers", "a reset keeps the integral", "src/control/pid/error_pid.rs",
      "self.interrupt();\n        self.integral = 0.0;\n        self.output = 0.0;",

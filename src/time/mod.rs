@@ -22,13 +22,11 @@
 
 mod clock;
 mod instant;
-mod step;
 mod ticker;
 
 pub use clock::{Clock, ExtendedCounter, ManualClock};
 pub use instant::{Duration, Instant};
-pub use step::TimeStep;
-pub use ticker::{Tick, Ticker};
+pub use ticker::{Tick, Ticker, TimeStep};
 
 /// The beginning or the end of a condition `C` of a bus or of a source of data.
 ///
