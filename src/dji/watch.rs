@@ -246,8 +246,7 @@ pub(super) fn check<const N: usize>(motors: &mut Motors<N>, index: u8, word: i16
         word,
         window: motors.rounds.window(),
         feedback_hz: motors.rounds.feedback_hz,
-        is_alone: u64::from(now.wrapping_sub(motors.rounds.rival_heard))
-            > Rival::FORGOTTEN.as_micros(),
+        is_alone: Rival::is_gone(now, motors.rounds.rival_heard),
     };
     motors.change(index, motors.guard.updated(), |slot| health::check(slot, &seen));
 }

@@ -208,7 +208,7 @@ impl Guard {
         self.motor.relax();
     }
 
-    /// Tells whether feedback is missing for arming at `now`.
+    /// Tells whether feedback is missing for arming at `now`. Also `true` if `now` lies more than a minute from the last update.
     #[must_use]
     pub fn is_missing(&self, now: Instant) -> bool {
         self.device.misses(&self.motor, now)
@@ -410,6 +410,18 @@ mod tests {
         guard.engage(at_ms(1));
         guard.admit(true).unwrap();
         guard
+    }
+
+    #[test]
+    fn a_pause_while_the_range_opens_leaves_it_open() {
+        for pause_ms in [60_001, 2_400_000, 4_290_000] {
+            let mut guard = deaf();
+            assert!(guard.drives(at_ms(50)) && guard.share() < 0.5);
+            assert!(!guard.drives(at_ms(pause_ms)), "the target is too old");
+            guard.admit(true).unwrap();
+            assert!(guard.drives(at_ms(pause_ms + 1)));
+            assert_eq!(guard.share().to_bits(), 1.0_f32.to_bits(), "{pause_ms} ms");
+        }
     }
 
     #[test]

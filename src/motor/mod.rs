@@ -63,6 +63,8 @@ pub(crate) use own::{
 };
 pub use own::{Impedance, ImpedanceControl, Inquiry, Order, Own, OwnMotor, Settings, Target};
 pub use safety::OPENING;
-pub(crate) use safety::{Ages, DeviceGuard, Hold, LONGEST_PAUSE, MotorGuard, Rest, age, take_age};
+pub(crate) use safety::{
+    Ages, DeviceGuard, Hold, LONGEST_PAUSE, MotorGuard, Rest, age, is_near, take_age,
+};
 pub(crate) use watch::Watch;
 pub use watch::{Severity, Vitals};

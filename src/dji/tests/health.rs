@@ -69,6 +69,19 @@ fn a_second_master_is_forgotten_a_second_after_its_last_frame_and_not_earlier() 
     }
 }
 
+/// As from an interrupt that stamps a frame after the tick has read its clock.
+#[test]
+fn a_second_master_a_little_ahead_of_the_update_stays() {
+    let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1)]);
+    let command = CanFrame::standard(0x200, [0; 8]).unwrap();
+    for ms in 2..100 {
+        hear(&mut bus, 0x201, ms);
+        assert_eq!(bus.ingest(&command, at_ms(ms) + Duration::from_micros(50)), Ingest::Unrelated);
+        step(&mut bus, ms);
+        assert!(bus.conditions(wheel).contains(Condition::SecondMaster), "{ms} ms");
+    }
+}
+
 #[test]
 fn a_driver_that_echoes_is_no_second_master() {
     for (bus, expected) in [(Bus::new(), true), (Bus::new().with_loopback(), false)] {

@@ -26,8 +26,9 @@ pub struct Edge {
     pub condition: Condition,
     /// Whether the condition began; otherwise the condition ended.
     pub began: bool,
-    /// Time of detection, rounded down to 1.024 ms. If more edges wait than the owner of the motor has times for (12 for a
-    /// [`Bus`](crate::dji::Bus)), the later edges have the last time kept: they came later.
+    /// Time of detection, rounded down to 1.024 ms, up to an age of 24 days. If more edges wait than the owner of the motor has times for
+    /// (12 for a [`Bus`](crate::dji::Bus), 6 for a motor outside of a bus and for a joint), the later edges have the last time kept: they
+    /// came later.
     pub at: Instant,
 }
 

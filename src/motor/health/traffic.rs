@@ -1,3 +1,4 @@
+use crate::motor::is_near;
 use crate::time::{Duration, Instant};
 
 /// Gaps are kept in units of 16 µs, up to a second.
@@ -121,7 +122,8 @@ pub(crate) struct Rival(Option<Instant>);
 
 impl Rival {
     /// Time after the last frame from which the node counts as gone.
-    pub(crate) const FORGOTTEN: Duration = Duration::from_secs(1);
+    const FORGOTTEN_US: u32 = 1_000_000;
+    const FORGOTTEN: Duration = Duration::from_micros(Self::FORGOTTEN_US as u64);
 
     pub(crate) const NONE: Self = Self(None);
 
@@ -129,9 +131,15 @@ impl Rival {
         self.0 = Some(now);
     }
 
-    /// Forgets a node that has fallen silent.
+    /// Forgets a node that has fallen silent. A frame further ahead was heard before the clock was set back: its age is unknown.
     pub(crate) fn check(&mut self, now: Instant) {
-        self.0 = self.0.filter(|heard| now.since(*heard) <= Self::FORGOTTEN);
+        let is_near = |heard: &Instant| now.since(*heard).max(heard.since(now)) <= Self::FORGOTTEN;
+        self.0 = self.0.filter(is_near);
+    }
+
+    /// Tells whether the node of a frame heard at a stamp has fallen silent. A stamp may lie a little ahead of `now`.
+    pub(crate) const fn is_gone(now: u32, heard: u32) -> bool {
+        !is_near(now, heard, Self::FORGOTTEN_US)
     }
 
     pub(crate) const fn is_present(self) -> bool {
@@ -214,6 +222,17 @@ mod tests {
                 gap_ms = 0;
             }
             prop_assert!(!traffic.is_double());
+        }
+    }
+
+    #[test]
+    fn a_frame_counts_for_a_second_on_both_sides_of_it() {
+        let at_ms = |ms: u64| Instant::START + Duration::from_millis(ms);
+        for (now_ms, is_present) in [(2_500, true), (4_500, true), (2_499, false), (4_501, false)] {
+            let mut rival = Rival::NONE;
+            rival.hear(at_ms(3_500));
+            rival.check(at_ms(now_ms));
+            assert_eq!(rival.is_present(), is_present, "{now_ms} ms");
         }
     }
 }

@@ -79,7 +79,7 @@ const LONGEST_PAUSE_US: u32 = 60_000_000;
 /// A stamp may lie after `now`, because an interrupt may stamp a frame just after a tick has read the clock. The limit holds there too:
 /// after a set-back of the clock, an old stamp must not look fresh.
 #[inline]
-const fn is_near(now: u32, stamp: u32, limit: u32) -> bool {
+pub(crate) const fn is_near(now: u32, stamp: u32, limit: u32) -> bool {
     now.wrapping_sub(stamp).wrapping_add(limit) <= limit.wrapping_mul(2)
 }
 
