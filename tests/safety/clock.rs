@@ -43,6 +43,8 @@ enum Pace {
     Even,
     /// Whole milliseconds, or one microsecond beside: the limits are met to the microsecond.
     Grid,
+    /// The same, and slow: a second is over before the clock is.
+    Slow,
 }
 
 /// Real time, and a clock that reads it.
@@ -68,9 +70,10 @@ impl Clock {
         } else {
             random.below(1 << 33)
         };
-        let pace = match random.below(3) {
+        let pace = match random.below(4) {
             0 => Pace::Any,
             1 => Pace::Even,
+            2 => Pace::Slow,
             _ => Pace::Grid,
         };
         Self { kind, real: start, read: 0, pace }
@@ -81,6 +84,7 @@ impl Clock {
             _ if random.one_in(512) => 59_900_000 + random.below(200_000),
             Pace::Any => 1 + random.of_any_size(4, 13),
             Pace::Even => 1 + random.below(16_000),
+            Pace::Slow => 1_000 * (1 + random.below(60)) + random.pick([0, 0, 0, 0, 0, 0, 1]),
             Pace::Grid => 1_000 * (1 + random.below(12)) + random.pick([0, 0, 0, 0, 0, 0, 1]),
         };
         self.read = match self.kind {

@@ -1,8 +1,20 @@
 //! The rules of the safety core for one motor, in 64-bit times: slow, obvious, and without any code of the crate.
 //!
-//! It shares with the crate the names of a link and of the errors, no more.
+//! It shares with the crate the names of a link, of the conditions and of the errors, no more.
 
-use drivetrain::motor::{Link, TargetError};
+mod arming;
+mod edges;
+mod opening;
+mod rival;
+mod rules;
+
+use drivetrain::motor::{Condition, Conditions, Link, TargetError};
+use edges::Edges;
+use opening::Opening;
+pub(super) use opening::Opens;
+use rival::Rival;
+pub(super) use rival::Rivals;
+pub(super) use rules::{BadStep, Bounds, Refusal, Rules, Setup};
 
 const DEADLINE_US: u64 = 100_000;
 const OFFLINE_US: u64 = 100_000;
@@ -13,37 +25,10 @@ const LONGEST_STEP_US: u64 = 20_000;
 const LONGEST_PAUSE_US: u64 = 60_000_000;
 /// A 32-bit stamp repeats: a clock that is wrong by as much goes unnoticed where the frames of a recovery are counted.
 const REPEATS_US: u64 = 1 << 32;
+/// A bus has a turn for each of its ids, and one to begin.
+const TURNS: u32 = 12;
 /// Where a stamp lies further ahead than this, it may be taken for one long ago.
 const TOLD_US: u64 = REPEATS_US / 2;
-
-/// What a time step that is zero or NaN does.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum BadStep {
-    /// The device leaves the last commands for one update that is not late, whatever the ages are.
-    Repeats,
-    /// The same, and the next one takes every target away; the motors do not see either update.
-    RepeatsThenRelaxes,
-    /// Ages count as ever; a motor that may be driven gets its last command once.
-    Ages,
-    /// The same, and the command is the target itself: there is no loop.
-    OpenLoop,
-}
-
-/// What one motor differs in from the next.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Rules {
-    /// It has feedback, which is late after so long.
-    pub(super) late_us: Option<u64>,
-    /// It takes targets again after a recovery.
-    pub(super) resumes: bool,
-    pub(super) bad_step: BadStep,
-    /// A request to arm is granted by the next update.
-    pub(super) arms_later: bool,
-    /// A request gives its time to targets, of a motor that is armed already as well.
-    pub(super) arms_again: bool,
-    /// Its drive is asked for settings and enabled first: it may rest where the reference drives, and refuse to be armed.
-    pub(super) is_prepared: bool,
-}
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Arming {
@@ -53,15 +38,7 @@ enum Arming {
     Tripped,
 }
 
-/// Why arming is refused.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Refusal {
-    Stopped,
-    Missing,
-    NotReleased,
-}
-
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Reference {
     rules: Rules,
     pub(super) link: Link,
@@ -87,10 +64,29 @@ pub(super) struct Reference {
     /// The last update drove the motor with a usable step, and nothing has ended that since.
     may_repeat: bool,
     bad_steps: u32,
+    edges: Edges,
+    rival: Rival,
+    /// The target, as a share of the full output.
+    value: f64,
+    opening: Opening,
+    /// The share of the last command, which a bus finds at the turn of the motor.
+    share: f64,
+    /// The updates of a bus with a usable step.
+    steps: u32,
+    /// The last update that gave a command, and the last that was seen to give none.
+    commanded: u64,
+    rested: u64,
+    /// The last update was seen to give none.
+    is_resting: bool,
+    bounds: Bounds,
+    is_in_doubt: bool,
+    is_target_ahead: bool,
+    /// The motor saw the last update.
+    is_seen: bool,
 }
 
 impl Reference {
-    pub(super) fn new(rules: Rules) -> Self {
+    pub(super) fn new(rules: Rules, setup: Setup) -> Self {
         Self {
             rules,
             link: if rules.late_us.is_some() { Link::Unheard } else { Link::Online },
@@ -110,6 +106,19 @@ impl Reference {
             arms_with_update: false,
             may_repeat: false,
             bad_steps: 0,
+            edges: Edges::new(rules.room),
+            rival: Rival::new(rules.rivals, setup.on_rival),
+            value: 0.0,
+            opening: Opening::new(setup.opening),
+            share: 1.0,
+            steps: 0,
+            commanded: 0,
+            rested: 0,
+            is_resting: true,
+            bounds: Bounds { least: 0.0, most: 0.0 },
+            is_in_doubt: false,
+            is_target_ahead: false,
+            is_seen: false,
         }
     }
 
@@ -126,11 +135,12 @@ impl Reference {
     /// Takes a frame; the device's own link after it counts only where a stamp does not tell.
     pub(super) fn hear(&mut self, now: u64, link: Link) {
         let Some(late_us) = self.rules.late_us else { return };
+        self.edges.begin_call();
         if !self.is_running {
             self.forget_after_a_pause(self.updated, now);
             self.updated = now;
             if self.link != Link::Unheard && self.is_far_ahead(now) && link == Link::Recovering {
-                self.lose();
+                self.lose(now);
             }
         }
         let was_offline = matches!(self.link, Link::Offline | Link::Recovering);
@@ -141,9 +151,14 @@ impl Reference {
         self.heard = now;
         self.link =
             if was_offline && self.good_frames < 10 { Link::Recovering } else { Link::Online };
+        if self.link == Link::Online {
+            self.edges.set(Condition::Late, false, now);
+            self.edges.set(Condition::Offline, false, now);
+        }
         let is_back = was_offline && self.link == Link::Online;
         if is_back && self.arming == Arming::Latched && self.rules.resumes {
             self.arming = Arming::Armed;
+            self.open(now);
         }
     }
 
@@ -153,12 +168,16 @@ impl Reference {
 
     fn is_missing(&self, now: u64) -> bool {
         let is_far = now.abs_diff(self.updated) > LONGEST_PAUSE_US;
-        self.rules.late_us.is_some() && (is_far || self.link != Link::Online || !self.is_fresh(now))
+        let listens = self.rules.late_us.is_some();
+        // A motor without feedback is not armed either at a time that is far from its updates.
+        let is_far = is_far && (listens || self.is_running && !self.rules.arms_later);
+        is_far || listens && (self.link != Link::Online || !self.is_fresh(now))
     }
 
     /// A stamp that lies far ahead may be taken for one long ago: a motor may be offline then. The pause that made one old is
     /// lost where a joint saw only the update after it, whose time did not move on: its link may stay what it was.
-    pub(super) fn accept(&mut self, link: Link) {
+    /// A target that was set far ahead may be taken for an expired one, where the motor trips anyway.
+    pub(super) fn accept(&mut self, link: Link, conditions: Conditions) {
         let is_lost = |link| matches!(link, Link::Late | Link::Recovering | Link::Offline);
         let now = self.device_updated.unwrap_or(0);
         let is_ahead = self.is_far_ahead(now) && link == Link::Offline;
@@ -166,6 +185,14 @@ impl Reference {
             && self.rules.bad_step == BadStep::RepeatsThenRelaxes;
         if is_lost(link) && is_lost(self.link) && (is_ahead || is_old) {
             self.link = link;
+            let is_lost = link != Link::Late;
+            self.edges.correct(Condition::Offline, is_lost, now);
+        }
+        if self.rules.loses_zero && self.is_seen && self.link == Link::Offline {
+            self.edges.set(Condition::PositionUncertain, true, now);
+        }
+        if self.is_target_ahead && conditions.contains(Condition::CommandLost) {
+            self.edges.set(Condition::CommandLost, true, now);
         }
     }
 
@@ -175,8 +202,8 @@ impl Reference {
 
     // Targets.
 
-    pub(super) fn set(&mut self, is_finite: bool) -> Result<(), TargetError> {
-        let outcome = match (is_finite, self.arming, self.link) {
+    pub(super) fn set(&mut self, value: f32) -> Result<(), TargetError> {
+        let outcome = match (value.is_finite(), self.arming, self.link) {
             (false, ..) => Err(TargetError::NotFinite),
             (true, Arming::Disarmed, _) => Err(TargetError::Disarmed),
             (true, Arming::Latched | Arming::Tripped, _) => Err(TargetError::Relaxed),
@@ -184,7 +211,7 @@ impl Reference {
             (true, Arming::Armed, _) => Err(TargetError::NoFeedback),
         };
         if outcome.is_ok() {
-            self.target = Some(self.target_time);
+            (self.target, self.value) = (Some(self.target_time), value.into());
         } else {
             // No older target acts in its place.
             self.relax();
@@ -196,129 +223,76 @@ impl Reference {
         (self.target, self.may_repeat) = (None, false);
     }
 
-    // Arming.
-
-    /// Takes a request to arm, whatever comes of it.
-    pub(super) fn ask(&mut self) {
-        self.is_granted = !self.tripped || self.quiet_us >= PAUSE_US;
-        self.quiet_us = 0;
-    }
-
-    pub(super) fn refusal(&self, now: u64) -> Option<Refusal> {
-        if self.is_stopped {
-            Some(Refusal::Stopped)
-        } else if self.is_missing(now) {
-            Some(Refusal::Missing)
-        } else {
-            (!self.is_granted).then_some(Refusal::NotReleased)
-        }
-    }
-
-    pub(super) fn is_arming(&self) -> bool {
-        self.arms_with_update
-    }
-
-    /// The request is granted, of all motors.
-    pub(super) fn arm(&mut self, now: u64) {
-        if self.rules.arms_later {
-            self.arms_with_update = !self.is_armed();
-        } else {
-            self.engage(now);
-        }
-    }
-
-    fn engage(&mut self, now: u64) {
-        if self.is_armed() && !self.rules.arms_again {
-            return;
-        }
-        self.tripped = false;
-        if !self.is_armed() {
-            self.relax();
-            self.arming = Arming::Armed;
-        }
-        self.armed_at = self.armed_at.max(now);
-        self.target_time = now;
-    }
-
-    pub(super) fn disarm(&mut self) {
-        self.relax();
-        self.arming = Arming::Disarmed;
-        self.arms_with_update = false;
-    }
-
-    pub(super) fn stop(&mut self) {
-        if !self.is_stopped {
-            self.disarm();
-            self.begin_pause();
-        }
-        self.is_stopped = true;
-        self.arms_with_update = false;
-    }
-
-    pub(super) fn clear_stop(&mut self) {
-        if self.is_stopped {
-            self.begin_pause();
-        }
-        self.is_stopped = false;
-    }
-
-    fn begin_pause(&mut self) {
-        (self.tripped, self.quiet_us, self.is_granted) = (true, 0, false);
-    }
-
-    /// The motor is relaxed until it is armed again.
-    fn fall_to(&mut self, arming: Arming) {
-        if self.is_armed() {
-            self.begin_pause();
-        }
-        if self.is_armed() || self.arming == Arming::Latched && arming == Arming::Tripped {
-            self.arming = arming;
-        }
-        self.relax();
-    }
-
     // Time.
 
-    /// Returns whether the motor is driven in this update.
-    pub(super) fn update(&mut self, now: u64, has_step: bool) -> bool {
+    /// Returns the output of the motor if it is driven in this update.
+    pub(super) fn update(&mut self, now: u64, has_step: bool) -> Option<Bounds> {
+        self.edges.begin_call();
+        if self.rules.rivals == Rivals::AtUpdate {
+            self.look_for_rival(now);
+        }
         let is_shielded = self.rules.bad_step == BadStep::RepeatsThenRelaxes;
         let device_before = self.device_updated.replace(now);
         let device_moves_on = device_before.is_none_or(|before| before < now);
+        self.is_seen = false;
         if is_shielded && device_moves_on && !has_step {
-            return self.update_unseen(device_before.unwrap_or(0), now);
+            return self.update_unseen(device_before.unwrap_or(0), now).then_some(self.bounds);
         }
         let before = core::mem::replace(&mut self.updated, now);
         let was_running = core::mem::replace(&mut self.is_running, true);
+        self.is_target_ahead = self.target.is_some_and(|set| set > now.saturating_add(TOLD_US));
         let moves_on = self.armed_at <= now && (!was_running || before < now);
         self.target_time = now;
         let step = if was_running { now.saturating_sub(before) } else { 0 };
         self.quiet_us = if moves_on { self.quiet_us + step.min(LONGEST_STEP_US) } else { 0 };
         let loses_time = !moves_on || is_shielded && !device_moves_on;
-        if !loses_time || self.rules.bad_step == BadStep::Repeats {
+        // Before its first update, a motor without feedback has no time.
+        let is_dated = was_running || self.rules.late_us.is_some();
+        let takes_turns = self.rules.bad_step == BadStep::Repeats;
+        // A bus that compares ages anyway leaves a motor offline for its age, and forgets no target of it.
+        let is_compared = takes_turns && !loses_time && has_step;
+        let is_pause = now.saturating_sub(before) > LONGEST_PAUSE_US;
+        if is_dated && (!loses_time || takes_turns) && (is_pause || !is_compared) {
             self.forget_after_a_pause(before, now);
         }
         if loses_time {
             self.lose_time(now);
         }
-        if !loses_time && (has_step || self.rules.bad_step != BadStep::Repeats) {
+        if !loses_time && (has_step || !takes_turns) {
+            if !takes_turns {
+                self.end_what_is_over(now);
+            }
             self.age(now);
+            if takes_turns {
+                self.take_turn(now);
+            }
+        }
+        self.is_seen = device_moves_on;
+        if self.rules.rivals == Rivals::AtFrame && device_moves_on {
+            self.look_for_rival(now);
         }
         if core::mem::take(&mut self.arms_with_update) {
             if !self.tripped || self.is_granted {
                 self.engage(now);
             }
-            return false;
+            return None;
         }
         let is_usable = has_step && (device_moves_on || !is_shielded);
         self.bad_steps = if is_usable { 0 } else { self.bad_steps + 1 };
         let may_drive = self.is_armed() && self.link == Link::Online && self.target.is_some();
         let may_repeat = core::mem::replace(&mut self.may_repeat, has_step && may_drive);
-        match self.rules.bad_step {
+        let drives = match self.rules.bad_step {
             _ if has_step => may_drive,
+            BadStep::Unknown => may_drive,
             BadStep::Repeats => may_repeat && !self.is_late_step(before, now),
             BadStep::OpenLoop => may_drive && self.bad_steps == 1,
             BadStep::Ages | BadStep::RepeatsThenRelaxes => may_drive && may_repeat,
+        };
+        let goes_on = matches!(self.rules.bad_step, BadStep::OpenLoop | BadStep::Unknown);
+        if drives && (has_step || goes_on) {
+            self.bounds = self.predict(now);
         }
+        drives.then_some(self.bounds)
     }
 
     fn is_late_step(&self, before: u64, now: u64) -> bool {
@@ -338,8 +312,10 @@ impl Reference {
     fn lose_time(&mut self, now: u64) {
         self.armed_at = now;
         self.arms_with_update = false;
+        self.edges.set(Condition::ClockFault, true, now);
         if self.rules.late_us.is_some() && self.link == Link::Online {
             self.link = Link::Late;
+            self.edges.set(Condition::Late, true, now);
         }
         self.fall_to(Arming::Tripped);
     }
@@ -348,9 +324,9 @@ impl Reference {
         let is_unknown = |time: u64| now.saturating_sub(before.min(time)) > LONGEST_PAUSE_US;
         let listens = self.rules.late_us.is_some() && self.link != Link::Unheard;
         if listens && is_unknown(self.heard) {
-            self.lose();
+            self.lose(now);
         } else if self.target.is_some_and(is_unknown) {
-            self.relax();
+            self.forget_target(now);
         }
     }
 
@@ -359,17 +335,48 @@ impl Reference {
         match self.link {
             Link::Unheard | Link::Offline => {}
             Link::Online if self.is_fresh(now) => {}
-            Link::Online | Link::Late | Link::Recovering if is_old => self.lose(),
-            Link::Online => self.link = Link::Late,
+            Link::Online | Link::Late | Link::Recovering if is_old => self.lose(now),
+            Link::Online => {
+                self.link = Link::Late;
+                self.edges.set(Condition::Late, true, now);
+            }
             Link::Late | Link::Recovering => {}
         }
         if self.target.is_some_and(|set| now.abs_diff(set) > DEADLINE_US) {
-            self.relax();
+            self.forget_target(now);
         }
     }
 
-    fn lose(&mut self) {
+    fn lose(&mut self, now: u64) {
         self.link = Link::Offline;
+        self.edges.set(Condition::Late, true, now);
+        self.edges.set(Condition::Offline, true, now);
         self.fall_to(Arming::Latched);
+    }
+
+    fn forget_target(&mut self, now: u64) {
+        self.relax();
+        self.edges.set(Condition::CommandLost, true, now);
+    }
+
+    /// In an update whose time moved on.
+    fn end_what_is_over(&mut self, now: u64) {
+        if self.target.is_some() {
+            self.edges.set(Condition::CommandLost, false, now);
+        }
+        self.edges.set(Condition::ClockFault, false, now);
+    }
+
+    /// A bus looks at one motor in each update.
+    fn take_turn(&mut self, now: u64) {
+        let is_its_turn = self.steps.is_multiple_of(TURNS);
+        self.steps += 1;
+        if is_its_turn {
+            self.end_what_is_over(now);
+            self.look_for_rival(now);
+            if self.link == Link::Online {
+                self.share = self.opening.share(now);
+            }
+        }
     }
 }

@@ -1,0 +1,69 @@
+//! The differences between devices, and the choices of a program.
+
+use super::{Opens, Rivals};
+use drivetrain::motor::Reaction;
+use drivetrain::time::Duration;
+
+/// What a time step that is zero or NaN does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum BadStep {
+    /// The device leaves the last commands for one update that is not late, whatever the ages are.
+    Repeats,
+    /// The same, and the next one takes every target away; the motors do not see either update.
+    RepeatsThenRelaxes,
+    /// Ages count as ever; a motor that may be driven gets its last command once.
+    Ages,
+    /// The same, and the command is the target itself: there is no loop.
+    OpenLoop,
+    /// There is no time step.
+    Unknown,
+}
+
+/// What one motor differs in from the next.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Rules {
+    /// It has feedback, which is late after so long.
+    pub(crate) late_us: Option<u64>,
+    /// It takes targets again after a recovery.
+    pub(crate) resumes: bool,
+    pub(crate) bad_step: BadStep,
+    /// A request to arm is granted by the next update.
+    pub(crate) arms_later: bool,
+    /// A request gives its time to targets, of a motor that is armed already as well.
+    pub(crate) arms_again: bool,
+    /// Its drive is asked for settings and enabled first: it may rest where the reference drives, and refuse to be armed.
+    pub(crate) is_prepared: bool,
+    /// So many unread edges have an order and a time of their own.
+    pub(crate) room: usize,
+    /// A motor that was lost no longer knows its zero.
+    pub(crate) loses_zero: bool,
+    pub(crate) opens: Opens,
+    /// An output is exact within this.
+    pub(crate) resolution: f64,
+    pub(crate) rivals: Rivals,
+}
+
+/// The choices of a program, for each motor of a device.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Setup {
+    pub(crate) opening: Duration,
+    pub(crate) on_rival: Reaction,
+}
+
+/// Why arming is refused.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Refusal {
+    Stopped,
+    Missing,
+    SecondMaster,
+    /// A setting of the drive, of which the reference knows nothing.
+    Setting,
+    NotReleased,
+}
+
+/// The least and the most output of a motor that is driven.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Bounds {
+    pub(crate) least: f64,
+    pub(crate) most: f64,
+}
