@@ -38,7 +38,6 @@
 //! greatest age can have exceeded its limit.
 
 mod device;
-mod gesture;
 mod motor;
 
 use crate::time::{Duration, Instant};
