@@ -92,7 +92,7 @@ impl Differentiator<true> {
 impl<const OPTIMAL: bool> Differentiator<OPTIMAL> {
     /// Steps by `dt_s` seconds towards `input` and returns the new value.
     ///
-    /// Costs 57 instructions on a Cortex-M4F, for the linear one (`docs/figures.md`).
+    /// Costs 54 instructions on a Cortex-M4F, for the linear one (`docs/figures.md`).
     pub fn update(&mut self, input: f32, dt_s: f32) -> f32 {
         let (r, h0_s) = (self.r, self.h0_s);
         let step = TimeStep::new(dt_s, self.follower.max_step_s);
