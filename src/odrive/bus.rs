@@ -4,7 +4,8 @@ use super::codec::{
     ASK_ENDPOINT, COMMANDS, Command, ENDPOINT, ERRORS, ESTIMATES, HEARTBEAT, endpoint,
     endpoint_value, id, number_of, request, words,
 };
-use super::{Feedback, Firmware, Heartbeat, Motor};
+use super::config::Endpoint;
+use super::{Endpoints, Feedback, Firmware, Heartbeat, Motor};
 use crate::frame::CanFrame;
 use crate::motor::{
     Capabilities, Capability, Claim, Goal, Ingest, MotorName, Order, OwnMotor, Role, Told, Vitals,
@@ -185,12 +186,14 @@ impl OwnMotor for Motor {
 
     /// An axis in calibration or in an unknown state is not armed, nor a drive that did not confirm an endpoint.
     fn wrong_setting(&self) -> Option<WrongSetting> {
-        let (name, settings) = (self.name(), &self.settings);
-        let missed = settings.wrong_setting(name, |_, _| true, |(_, _, it)| it, |_| f32::NAN);
+        let (motor, names) = (self.name(), Endpoints::NAMES);
+        let name = |(_, _, place): Endpoint| names.get(usize::from(place)).copied();
+        let name = |endpoint| name(endpoint).unwrap_or_default();
+        let missed = self.settings.wrong_setting(motor, |_, _| true, name, |_| f32::NAN);
         let is_known = matches!(self.axis(), Some(Heartbeat::IDLE | Heartbeat::CLOSED_LOOP));
         let is_wrong = self.state.phase == Phase::Off && !is_known;
         let (expected, found) = (Heartbeat::IDLE.into(), self.axis().map(f32::from));
-        let of_axis = || WrongSetting::new(name, "axis state", expected, found);
+        let of_axis = || WrongSetting::new(motor, "axis state", expected, found);
         missed.or_else(|| is_wrong.then(of_axis))
     }
 

@@ -229,8 +229,8 @@ impl Mode {
     }
 }
 
-/// Number, form and name of an endpoint: a setting of the drive.
-pub(super) type Endpoint = (u16, Form, &'static str);
+/// Number and form of an endpoint, a setting of the drive, and its place among the [names](Endpoints::NAMES).
+pub(super) type Endpoint = (u16, Form, u8);
 
 /// The endpoints to be confirmed before closed loop.
 type Preparations = [Preparation<Endpoint>; 4];
@@ -255,17 +255,18 @@ pub struct Endpoints {
 }
 
 impl Endpoints {
+    /// The names of the [preparations](Self::preparations).
+    pub(super) const NAMES: [&str; 4] =
+        ["control_mode", "input_mode", "watchdog_timeout", "enable_watchdog"];
+
     /// Returns the settings to be confirmed before closed loop, for a mode and a watchdog in s. The modes are read first: numbers of another
     /// version are found before anything is written.
     const fn preparations(&self, mode: &Mode, watchdog_s: f32) -> Preparations {
         [
-            Preparation::found(
-                (self.control_mode, Form::U8, "control_mode"),
-                mode.control.number as f32,
-            ),
-            Preparation::found((self.input_mode, Form::U8, "input_mode"), mode.input as f32),
-            Preparation::exact((self.watchdog_timeout, Form::F32, "watchdog_timeout"), watchdog_s),
-            Preparation::exact((self.enable_watchdog, Form::U8, "enable_watchdog"), 1.0),
+            Preparation::found((self.control_mode, Form::U8, 0), mode.control.number as f32),
+            Preparation::found((self.input_mode, Form::U8, 1), mode.input as f32),
+            Preparation::exact((self.watchdog_timeout, Form::F32, 2), watchdog_s),
+            Preparation::exact((self.enable_watchdog, Form::U8, 3), 1.0),
         ]
     }
 }

@@ -48,8 +48,8 @@ fn a_request_is_a_remote_frame_of_the_length_of_its_message() {
 #[test]
 fn an_endpoint_is_asked_for_and_written_as_in_the_example_of_the_documentation() {
     let frame = |asked| std::format!("{:?}", endpoint(0, asked).unwrap());
-    let read = |number| Inquiry::Read((number, Form::U8, ""));
-    let write = |form, value| Inquiry::Write((0x0102, form, ""), value);
+    let read = |number| Inquiry::Read((number, Form::U8, 0));
+    let write = |form, value| Inquiry::Write((0x0102, form, 0), value);
     assert_eq!(frame(read(0x1234)), "004 [4] 00 34 12 00");
     assert_eq!(frame(write(Form::U8, 1.0)), "004 [5] 01 02 01 00 01");
     assert_eq!(frame(write(Form::F32, 0.1)), "004 [8] 01 02 01 00 CD CC CC 3D");
