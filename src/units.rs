@@ -147,7 +147,7 @@ impl Angle {
     /// Returns the angle in -180 to 180 degrees, the upper end excluded, of the same direction.
     ///
     /// The shortest way from `a` to `b` is `(b - a).wrapped()`. Errors, NaN and infinity are those of
-    /// [`wrap_pi`](crate::math::wrap_pi).
+    /// [`wrap_pi`].
     ///
     /// # Examples
     /// ```
@@ -167,7 +167,7 @@ impl Angle {
     /// Returns the angle in 0 to 360 degrees, the upper end excluded, of the same direction.
     ///
     /// For display and for programs with this range. Errors, NaN and infinity are those of
-    /// [`wrap_tau`](crate::math::wrap_tau).
+    /// [`wrap_tau`].
     ///
     /// # Examples
     /// ```
