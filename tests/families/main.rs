@@ -8,4 +8,5 @@ mod load;
 mod motors;
 mod rest;
 mod station;
+mod switch;
 mod table;

@@ -350,6 +350,9 @@ impl<M: OwnMotor> Own<M> {
         self.relax();
         if self.power.stop() {
             self.disable();
+        } else if self.rested.is_some() {
+            // At rest already: a program that disarms in each tick must not keep the questions from their turn.
+            return;
         }
         self.rested = None;
         let rest = self.rest();
