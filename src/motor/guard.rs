@@ -208,7 +208,8 @@ impl Guard {
         self.motor.relax();
     }
 
-    /// Tells whether feedback is missing for arming at `now`. Also `true` if `now` lies more than a minute from the last update.
+    /// Tells whether feedback is missing for arming at `now`. Once the motor has run or was heard, also `true` if `now` lies more than
+    /// a minute from the last update.
     #[must_use]
     pub fn is_missing(&self, now: Instant) -> bool {
         self.device.misses(&self.motor, now)
@@ -421,6 +422,18 @@ mod tests {
             guard.admit(true).unwrap();
             assert!(guard.drives(at_ms(pause_ms + 1)));
             assert_eq!(guard.share().to_bits(), 1.0_f32.to_bits(), "{pause_ms} ms");
+        }
+    }
+
+    #[test]
+    fn a_range_that_begins_to_open_at_the_end_of_a_pause_is_not_open_at_once() {
+        let mut guard = Guard::without_feedback();
+        assert!(!guard.drives(at_ms(1)));
+        guard.engage(at_ms(60_000));
+        guard.admit(true).unwrap();
+        for ms in [60_002, 60_010] {
+            _ = guard.drives(at_ms(ms));
+            assert!(guard.share() < 0.06, "{} at {ms} ms", guard.share());
         }
     }
 

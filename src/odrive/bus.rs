@@ -32,7 +32,7 @@ const LIMITS_EACH: u8 = 100;
 /// The code of the first bit of the reason of a disarmed drive.
 const DISARMED: u8 = 129;
 
-/// The frames, 10 ms apart, until a drive must have become idle and answered.
+/// The frames, 10 ms apart, until a drive must have become idle.
 const MOST_FRAMES: u8 = 200;
 
 /// The frames, 10 ms apart, from the request for closed loop until a drive must have followed.
@@ -160,7 +160,7 @@ impl OwnMotor for Motor {
         }
         let is_silent = self.state.silence_s > INQUIRY_S;
         if self.settings.has_missed() && !is_silent {
-            let asked = self.settings.inquire().and_then(|asked| endpoint(self.node, asked));
+            let asked = self.settings.inquire_missed().and_then(|asked| endpoint(self.node, asked));
             return Some(asked.unwrap_or_else(|| self.modes()));
         }
         let number = if is_silent { HEARTBEAT } else { ERRORS };

@@ -29,7 +29,8 @@
 //! the right torque constant. The heartbeat has to be cyclic (`heartbeat_rate_ms`, in 0.6 `heartbeat_msg_rate_ms`: 100 ms at
 //! delivery), as 0.5 sends the heartbeat in no other way. The estimates may be cyclic (`encoder_rate_ms`, `encoder_msg_rate_ms`:
 //! 10 ms at delivery). If the estimates are older than 5 ms a remote frame asks for them, in the place of a command; so set them to
-//! 1 ms or 2 ms for a loop on torque. In 0.6 the motor at rest also asks for heartbeat and errors. All else is set by the motor each
+//! 1 ms or 2 ms for a loop on torque. In 0.6 the motor at rest also asks for heartbeat and errors, and after
+//! an endpoint that was not confirmed sends the modes and reads that endpoint. All else is set by the motor each
 //! time before the drive is enabled, and lost with the supply: control mode, input mode, velocity limit, current limit, and the
 //! limits of a trajectory. `startup_closed_loop_control` has to be off: after a reset the drive would run in a mode that the motor
 //! has not set. A motor at rest requests idle, so no program with this motor may run while the drive calibrates.

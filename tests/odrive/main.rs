@@ -569,6 +569,28 @@ fn a_drive_that_does_not_take_its_mode_is_never_enabled() {
     assert_eq!(bench.drive.state(), Heartbeat::CLOSED_LOOP);
 }
 
+/// The numbers of the modes are right, that of the watchdog is of another version.
+#[test]
+fn an_endpoint_that_is_not_confirmed_is_read_at_rest_and_never_written() {
+    let wrong = Endpoints { watchdog_timeout: 77, ..ENDPOINTS };
+    let set =
+        motor(Mode::velocity(3.0), Firmware::V0_6).with_endpoints(wrong, Duration::from_millis(50));
+    let mut bench = Bench::with(set.unwrap(), GEAR);
+    bench.arm();
+    bench.steps(400, |bench| _ = bench.own.set_velocity((), velocity(5.0)));
+    assert!(!Devices::is_armed(&mut bench.own) && bench.drive.state() == Heartbeat::IDLE);
+    let (mut reads, mut writes) = (0, 0);
+    bench.steps(2_000, |bench| {
+        for frame in bench.frames.iter().filter(|frame| frame.header() == 0x64) {
+            let [operation, ..] = *frame.bytes();
+            (reads, writes) = (reads + u32::from(operation == 0), writes + u32::from(operation));
+        }
+    });
+    assert!(reads > 20 && writes == 0, "{reads} reads, {writes} writes");
+    let told = bench.own.arm(bench.now()).unwrap_err().to_string();
+    assert!(told.starts_with("D6374 #3 does not report its watchdog_timeout"), "{told}");
+}
+
 #[test]
 fn a_stop_is_sent_until_the_heartbeat_has_it() {
     for (firmware, bit) in [(Firmware::V0_5, 0x4000), (Firmware::V0_6, 0x0200_0000)] {

@@ -17,7 +17,7 @@
 //! | opening | after a pause the beginning may lie ahead (was in the crate) | guard without feedback | 3420 |
 //! | second master | the window has 1.05 s (`Rival`) | dji | 3300 |
 //! | second master | its claim is named for ever (`Own::second_master`) | dji and own | 120 |
-//! | second master | a command of other motors counts (`dji::rounds::hear_command`) | dji | 120 |
+//! | second master | a command of other motors counts (`dji::watch::hear_command`) | dji | 120 |
 //! | second master | a frame ahead of the update is one of long ago (was in the crate) | dji | 2940 |
 //! | second master | it stays until a clock that was set back has caught up (was in the crate) | dji and own | 2100 |
 //! | second master | a frame counts twice (`snake::Joints::ingest`) | snake | 120 |

@@ -227,7 +227,7 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
         if let Some(Missed { setting, written: Some(written), .. }) = self.missed
             && turn.is_multiple_of(2)
         {
-            let is_written = written.is_written && turn.is_multiple_of(4);
+            let is_written = turn.is_multiple_of(4);
             let write = Inquiry::Write(setting, written.value);
             return Some(self.ask(if is_written { write } else { Inquiry::Read(setting) }));
         }
@@ -254,6 +254,13 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
     /// Tells whether the drive did not confirm a setting.
     pub(crate) const fn has_missed(&self) -> bool {
         self.missed.is_some()
+    }
+
+    /// Returns a question for the setting that the drive did not confirm, each second time. Nothing is written.
+    pub(crate) fn inquire_missed(&mut self) -> Option<Inquiry<R>> {
+        self.turn = self.turn.wrapping_add(1);
+        let setting = self.missed.filter(|_| self.turn.is_multiple_of(2))?.setting;
+        Some(self.ask(Inquiry::Read(setting)))
     }
 
     /// Returns the question whose answer is awaited.

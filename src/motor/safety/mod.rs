@@ -73,7 +73,7 @@ pub(crate) enum Rest {
 /// Longest pause between two checks for which a 32-bit stamp still represents an age.
 const LONGEST_PAUSE_US: u32 = 60_000_000;
 
-/// Tells whether a stamp lies within `limit` of `now`, before or after.
+/// Tells whether a stamp, of 32 bits in µs, lies within `limit` of `now`, before or after. A stamp repeats after 71 min 35 s.
 ///
 /// A stamp may lie after `now`, because an interrupt may stamp a frame just after a tick has read the clock. The limit holds there too:
 /// after a set-back of the clock, an old stamp must not look fresh.
