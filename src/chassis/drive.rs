@@ -1,3 +1,5 @@
+//! Wheels and steered modules by the owners of their motors.
+
 use super::ModuleState;
 use crate::motor::{AngleDrive, TargetError, VelocityDrive};
 use crate::units::{Angle, AngularVelocity};

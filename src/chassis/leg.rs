@@ -1,3 +1,5 @@
+//! Legs of five bars, and the model of a robot that balances on two of them.
+
 use super::positive;
 use crate::control::solved;
 use crate::control::state_space::LinearSystem;

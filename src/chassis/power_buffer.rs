@@ -1,3 +1,5 @@
+//! Energy beside the power limit: the buffer of the referee system, and a super-capacitor.
+
 use super::{DeadClock, not_negative};
 use crate::control::{Pid, PidConfig};
 use crate::error::ConfigError;

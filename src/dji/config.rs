@@ -1,3 +1,5 @@
+//! Configuration of a motor, and gains in words of a drive.
+
 use super::{Facts, Gm6020Voltage, Model};
 use crate::control::PidConfig;
 use crate::encoder::GearRatio;

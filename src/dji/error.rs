@@ -1,3 +1,5 @@
+//! Errors of attaching a motor.
+
 use super::CommandFrame;
 use crate::motor::{BusLoad, MotorName};
 

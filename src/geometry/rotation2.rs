@@ -1,3 +1,5 @@
+//! Rotations in the plane, and headings.
+
 use super::Vec2;
 #[cfg(feature = "serde")]
 use super::{Rotation3, is_unit};

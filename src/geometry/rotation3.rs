@@ -1,3 +1,5 @@
+//! Rotations in space, and attitudes.
+
 #[cfg(feature = "serde")]
 use super::is_unit;
 use super::rotation2::angle_of;

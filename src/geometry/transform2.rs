@@ -1,3 +1,5 @@
+//! Transforms and poses in the plane.
+
 use super::twist::Arc;
 use super::vector::copy;
 use super::{Body, Heading, Point2, Rotation2, TOLERANCE, Twist, Vec2};

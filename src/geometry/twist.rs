@@ -1,3 +1,5 @@
+//! Motions of a frame, and the arc of a motion.
+
 use super::vector::{copy, linear};
 use super::{Body, Gimbal, Heading, Rotation2, Vec2, World};
 use crate::math::sin_cos;

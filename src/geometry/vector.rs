@@ -1,3 +1,5 @@
+//! Vectors and points.
+
 use crate::math::sqrt;
 use core::marker::PhantomData;
 

@@ -1,3 +1,5 @@
+//! Reasons against arming: missing motors, settings that differ, and all others.
+
 use super::{BusLoad, Claim, MotorName};
 
 /// The motors that prevent arming, by name.

@@ -1,3 +1,5 @@
+//! Names of motors, and the CAN ids that the motors claim.
+
 use embedded_can::Id;
 
 /// Sender of the frames of a claimed id.

@@ -1,3 +1,5 @@
+//! Owners of motors: velocities, angles and measured targets, and the handle of a motor of one of several owners.
+
 use super::{Capabilities, Capability};
 use crate::encoder::Position;
 use crate::time::Instant;

@@ -1,3 +1,5 @@
+//! The zero of a shaft, found at a mechanical stop.
+
 use crate::encoder::Position;
 use crate::error::{ConfigError, check, not_negative, positive};
 use crate::time::{Duration, Instant, Tick};

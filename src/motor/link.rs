@@ -1,3 +1,5 @@
+//! The link to a motor, and the ages at which feedback and commands count as lost.
+
 use crate::error::ConfigError;
 use crate::time::Duration;
 

@@ -1,3 +1,5 @@
+//! The load of a bus, by frames and their rates.
+
 use crate::frame::CanFrame;
 use core::num::NonZeroU32;
 

@@ -1,3 +1,5 @@
+//! Health of one motor outside of a bus: its vitals, and their checks.
+
 use super::{
     Condition, Conditions, Guard, Health, HealthConfig, Link, Monitor, MotorName, Rival, Sample,
     Traffic, elapsed,

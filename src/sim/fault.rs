@@ -1,3 +1,5 @@
+//! Faults of the simulator, and errors in the use of the simulator.
+
 use super::esc::{Random, Tampering};
 use super::motor::MOTORS;
 use super::rotor::Mechanics;

@@ -1,3 +1,5 @@
+//! Clocks: the trait, a clock set by hand, and the extension of a hardware counter.
+
 use super::{Duration, Instant};
 use crate::error::ConfigError;
 use core::cell::Cell;

@@ -1,3 +1,5 @@
+//! Ticks of a loop, and the time step of each tick.
+
 use super::{Duration, Instant};
 use core::num::NonZeroU32;
 

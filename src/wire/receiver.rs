@@ -1,3 +1,5 @@
+//! Receivers of a byte stream, and the deadline of its content.
+
 use super::{Counts, Decode, Deframer};
 use crate::time::{ConditionEdge, Duration, Instant};
 

@@ -1,3 +1,5 @@
+//! Observers: the Kalman filter, and the Luenberger observer.
+
 use super::{LinearSystem, riccati};
 use crate::control::matrix::{
     Grid, apply, difference, finite, identity, is_finite, not_negative, solved, sum, symmetric,

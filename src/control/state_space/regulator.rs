@@ -1,3 +1,5 @@
+//! Regulators: the gain of least cost, gains by a schedule, and the inverted plant.
+
 use super::{LinearSystem, riccati};
 use crate::control::matrix::{
     Grid, apply, finite, identity, is_finite, largest, narrow, paired, solved, times, transposed,

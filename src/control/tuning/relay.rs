@@ -1,3 +1,5 @@
+//! The relay experiment, and the rules from its result to gains.
+
 use crate::control::number::{self, Sum};
 use crate::control::pid::PidConfig;
 use crate::error::{ConfigError, check, finite, not_negative, positive};

@@ -1,3 +1,5 @@
+//! Statistics of the frames of a motor, and frames of a second master.
+
 use crate::motor::is_near;
 use crate::time::{Duration, Instant};
 

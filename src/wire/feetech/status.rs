@@ -1,3 +1,5 @@
+//! Answers of a servo, and the values of goals and measurements.
+
 use super::{checksum, register};
 use crate::units::Angle;
 use crate::wire::{Decode, Reader, Reject};
