@@ -47,17 +47,17 @@ def public_functions():
         parts = path.relative_to(SOURCES).parts
         if path.name == "tests.rs" or "tests" in parts or parts[0] in SKIPPED_FOLDERS:
             continue
-        owner = ""
+        owner = end = ""
         # Up to the tests in the file; `mod tests;` names another file, and the rest counts.
         code = re.split(r"(?m)^#\[cfg\(test\)\]\n(?:#\[.*\n)*mod \w+ \{", path.read_text())[0]
         for line in code.splitlines():
-            if head := re.match(r"\s*impl(?:<.*?>)? (?:.* for )?\$?(\w+)", line):
-                owner = head[1]
-            elif line == "}":
+            if head := re.match(r"(\s*)impl(?:<.*?>)? (?:.* for )?\$?(\w+)", line):
+                end, owner = head[1] + "}", head[2]
+            elif line == end:
                 owner = ""
             elif name := re.match(r"\s*pub (?:const )?fn (\w+)", line):
                 if owner not in SKIPPED and name[1] not in FORMATTING:
-                    found.add((owner if line.startswith(" ") else "", name[1]))
+                    found.add((owner, name[1]))
     return found
 
 
