@@ -32,7 +32,7 @@ run from power-on, and its trace has to be the same, bit for bit.
 * Stale: frames on the wire that are not zero and that waited in the controller for more than a cycle. The age in a queue before it is
   not seen, except by the words in the row `transmit starved`.
 
-| program | fault | in [Faults](faults.md) | zeros after, ms | stale | then |
+| program | fault | in [Faults][faults] | zeros after, ms | stale | then |
 |---|---|---|--:|--:|---|
 """
 MIDDLE = """
@@ -41,6 +41,9 @@ robot sends to its joints before the frame that is looked at. The stack is the d
 
 | program | jitter, us | instructions a cycle, mean | busiest | in interrupts, mean | deepest stack, B |
 |---|--:|--:|--:|--:|--:|
+"""
+TAIL = """
+[faults]: faults.md
 """
 FIGURES = ("jitter_us", "mean", "busiest", "interrupts")
 
@@ -68,7 +71,7 @@ def costs(results):
 def write(results):
     line = lambda key, cells: f"| {' | '.join((*key, *cells))} |\n"
     text = HEAD + "".join(line(*row) for row in rows(results))
-    return text + MIDDLE + "".join(line(*row) for row in costs(results))
+    return text + MIDDLE + "".join(line(*row) for row in costs(results)) + TAIL
 
 
 def read(text):
