@@ -1,6 +1,6 @@
 //! An ODrive: an axis whose heartbeat tells its state, and whose encoder estimates are the link.
 
-use super::drives::Output;
+use super::drives::{Output, own, rules};
 use super::*;
 use drivetrain::motor::{AngleDrive, CanDevice, Devices, ImpedanceControl, Own, OwnMotor};
 use drivetrain::odrive::{Firmware, Heartbeat, Mode, Model, Motor};
@@ -31,7 +31,6 @@ impl<const FOLLOWS: bool> Odrive<FOLLOWS> {
     fn new(mode: impl Into<Mode>, firmware: Firmware, setup: Setup) -> Self {
         let fastest = AngularVelocity::from_rad_per_s(10.0);
         let motor = Motor::new(Model::D6374, firmware, 3, fastest, mode).unwrap();
-        let motor = Own::new(motor).with_health(health(setup)).unwrap();
         let constant = Model::D6374.torque_constant();
         let drive = OdriveDrive::new(3, firmware == Firmware::V0_6, constant, 1.0);
         // Turns.
@@ -40,7 +39,7 @@ impl<const FOLLOWS: bool> Odrive<FOLLOWS> {
             let turns = f32::from_le_bytes([a, b, c, d]);
             (frame.header() == 0x6C).then_some(turns * core::f32::consts::TAU)
         });
-        Self { motor: motor.with_opening(setup.opening), drive, output, has_commanded: false }
+        Self { motor: own(motor, setup), drive, output, has_commanded: false }
     }
 
     fn message(&mut self, number: u16) -> CanFrame {
@@ -66,7 +65,7 @@ impl<const FOLLOWS: bool> Odrive<FOLLOWS> {
 }
 
 impl<const FOLLOWS: bool> Subject<1> for Odrive<FOLLOWS> {
-    const RULES: [Rules; 1] = [if FOLLOWS { FOLLOWING } else { PREPARED }];
+    const RULES: [Rules; 1] = rules(FOLLOWS);
 
     own!(self => self.motor);
 
