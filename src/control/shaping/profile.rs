@@ -80,9 +80,9 @@ pub struct ProfileState {
 /// # Edge behaviour
 /// A profile has no state: any moment may be evaluated first, and after any pause. Before the start, and for a time of NaN, the
 /// profile is at rest at the start; from [`duration_s`](Self::duration_s) on, at rest at exactly the end. A move of no length
-/// lasts 0 s, and so does a move shorter than 1e-38 s. A move whose length or duration is beyond `f32` is an error. A rise
-/// shorter than the resolution of `f32` (1e-38 s, of an acceleration near `f32::MAX`) is a jump of the speed, which still keeps
-/// its limit.
+/// lasts 0 s, and so does a move shorter than 1e-38 s. A move whose length or duration is beyond `f32` is an error. With
+/// an acceleration near `f32::MAX` the speed may rise in less than 1e-38 s, the shortest time of an `f32`: the speed then jumps, and stays
+/// within its limit.
 ///
 /// # Examples
 /// ```

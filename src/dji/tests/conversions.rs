@@ -39,7 +39,7 @@ impl Case {
     }
 
     /// Compares the word of the whole range with the exact product, for which `f64` has room. A reversed motor gets the
-    /// negative of that word, and one that is held back the nearest to it: upward for even bits, downward for odd ones.
+    /// negative of that word. A motor with a limited range gets the nearest word in the range: upward for even bits, downward for odd bits.
     fn check(&self, bits: u32) {
         let (value, limit) = (f32::from_bits(bits), f64::from(self.limit));
         let product = f64::from(value) * f64::from(self.raw_per_unit);
@@ -60,8 +60,8 @@ impl Case {
     }
 }
 
-/// Tells whether a word may stand for a product that is half a count off, or none: half a count goes to the even
-/// neighbour, and NaN to 0. The product is rounded to the 24 bits of an `f32` first, which may take it past a middle.
+/// Tells whether a word is right for a product half a count away, or for NaN: half a count goes to the even neighbour, NaN to 0.
+/// The product is rounded to the 24 bits of an `f32` first, possibly past the middle between two words.
 #[cold]
 #[expect(clippy::float_cmp, reason = "the difference is exact")]
 fn is_near_enough(word: i16, product: f64) -> bool {

@@ -1,4 +1,4 @@
-//! What the bus finds out about its motors in the course of time.
+//! Conditions of the motors of a bus: begin, end, and consequences.
 
 use super::*;
 use crate::motor::{Condition, Conditions, Edge};
