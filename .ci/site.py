@@ -1,6 +1,8 @@
 """Follows each link of the built documentation that a page of the repository brings: to a file that is there, and an id in it.
 
-site.py FOLDER: the folder of the crate, as cargo doc writes it. Python, no packages."""
+site.py FOLDER: the folder of the crate, as cargo doc writes it. site.py --pictures: writes the pictures of docs/ into docs/site.txt, as
+the site has no files of the repository. Python, no packages."""
+import base64
 import re
 import sys
 from html.parser import HTMLParser
@@ -48,7 +50,24 @@ def fault(path, address, pages):
     return None
 
 
+SITE = Path(__file__).parent.parent / "docs/site.txt"
+
+
+def site():
+    """The text of docs/site.txt with the pictures as they are."""
+    def picture(match):
+        data = (SITE.parent / match[1]).read_bytes()
+        return f"[{match[1]}]: data:image/svg+xml;base64,{base64.b64encode(data).decode()}"
+
+    return re.sub(r"(?m)^\[([^\]]+\.svg)\]: .*$", picture, SITE.read_text(encoding="utf-8"))
+
+
 def main(folder):
+    if folder == "--pictures":
+        SITE.write_text(site(), encoding="utf-8")
+        return
+    if SITE.read_text(encoding="utf-8") != site():
+        sys.exit("a picture has changed: .ci/site.py --pictures writes it into docs/site.txt")
     crate = Path(folder).resolve()
     own = [crate / "index.html", *crate.glob("guide/**/*.html"), *crate.glob("pages/**/*.html")]
     pages = {path: Page(path) for path in own}

@@ -68,7 +68,8 @@
 //!
 //! # A node of your own
 //! A test can play any other node of a bus: read each frame in [`Simulation::advance_with`] and answer with
-//! [`Simulation::inject`].
+//! [`Simulation::inject`]. Injected frames are shown too: a drive with one id for both directions ([`LkDrive`]) answers its own answers
+//! unless it hears frames of [`Sender::Controller`] alone.
 
 pub mod contract;
 

@@ -49,3 +49,16 @@ fn no_tick_without_a_disarm_is_needed_before_arming() {
         }
     }
 }
+
+/// `docs/motors.md` has this time.
+#[test]
+fn a_tenth_of_a_second_off_is_enough_to_arm_again() {
+    for family in &FAMILIES {
+        for (mode, make) in family.modes {
+            let mut station = make().driven();
+            station.steps(100, |station| station.device.disarm());
+            let armed = station.device.arm(station.now());
+            assert_eq!(armed, Ok(()), "{} {mode}", family.name);
+        }
+    }
+}

@@ -5,7 +5,7 @@ use drivetrain::dji::Bus;
 use drivetrain::encoder::Position;
 use drivetrain::motor::{AngleDrive, ImpedanceControl, Own};
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::sim::{DamiaoDrive, DriveShaft, Line, MotorConfig, Simulation};
+use drivetrain::sim::{DamiaoDrive, DriveShaft, Line, MotorConfig, Sender, Simulation};
 use drivetrain::time::Duration;
 use drivetrain::units::Angle;
 
@@ -28,7 +28,9 @@ fn a_damiao_joint_tilts_beside_the_yaw_motor() {
     for ms in 0..2_000 {
         let mut answers = Vec::new();
         world.advance_with(Duration::from_millis(1), |record| {
-            answers.extend(drive.hear(&record.frame))
+            if record.sender == Sender::Controller {
+                answers.extend(drive.hear(&record.frame));
+            }
         });
         answers.into_iter().for_each(|answer| world.inject(Line::Can2, answer).unwrap());
         (0..4).for_each(|_| drive.step(0.000_25));
