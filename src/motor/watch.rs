@@ -1,8 +1,8 @@
 //! Health of one motor outside of a bus: its vitals, and their checks.
 
 use super::{
-    Condition, Conditions, Guard, Health, HealthConfig, Link, Monitor, MotorName, Rival, Sample,
-    Traffic, elapsed,
+    Condition, Conditions, Guard, Health, HealthConfig, Latch, Link, Monitor, MotorName, Rival,
+    Sample, Traffic, elapsed,
 };
 use crate::time::{Duration, Instant};
 
@@ -111,17 +111,19 @@ impl Watch {
         let before = guard.conditions();
         self.traffic.end_window(&mut self.window_from, now);
         self.rival.check(now);
-        guard.note(Condition::SecondMaster, self.has_rival(), now);
+        let has_rival = self.has_rival();
         if guard.link() != Link::Online {
             self.monitor = Monitor::NEW;
+            guard.note(Condition::SecondMaster, has_rival, now);
         } else {
-            self.read_error(guard, vitals, now);
-            let since = now.since(self.checked);
-            if since >= PERIOD {
-                self.checked = now;
-                self.next = now + PERIOD;
-                self.share = self.check_slow(guard, vitals, elapsed(since.micros_u32()), now);
-            }
+            let slow = self.begin_slow(guard.is_armed(), vitals, now);
+            guard.latch(now, |latch| {
+                latch.set(Condition::SecondMaster, has_rival);
+                self.read_error(latch, vitals);
+                if let Some(sample) = slow {
+                    self.share = self.monitor.check(latch, &sample, self.config);
+                }
+            });
         }
         let begun = guard.conditions().minus(before).and(self.config.relaxing());
         if !begun.is_empty() || self.is_faulty(guard) {
@@ -130,9 +132,17 @@ impl Watch {
         self.share
     }
 
-    fn check_slow(&mut self, guard: &mut Guard, vitals: &Vitals, elapsed: u8, now: Instant) -> f32 {
-        let sample = Sample {
-            elapsed,
+    /// Returns the slow quantities, if their check is due.
+    fn begin_slow(&mut self, is_armed: bool, vitals: &Vitals, now: Instant) -> Option<Sample> {
+        let since = now.since(self.checked);
+        if since < PERIOD {
+            return None;
+        }
+        (self.checked, self.next) = (now, now + PERIOD);
+        let saturated = is_armed && vitals.effort.abs() >= 1.0;
+        self.saturated = self.saturated.saturating_add(u16::from(saturated));
+        Some(Sample {
+            elapsed: elapsed(since.micros_u32()),
             fresh: false,
             effort: vitals.effort,
             speed: vitals.speed,
@@ -142,17 +152,13 @@ impl Watch {
             angle: 0,
             rest: 0,
             temperature: vitals.temperature_c.zip(self.config.temperatures_c()),
-        };
-        let saturated = guard.is_armed() && vitals.effort.abs() >= 1.0;
-        self.saturated = self.saturated.saturating_add(u16::from(saturated));
-        let (monitor, config) = (&mut self.monitor, self.config);
-        guard.latch(now, |latch| monitor.check(latch, &sample, config))
+        })
     }
 
-    fn read_error(&mut self, guard: &mut Guard, vitals: &Vitals, now: Instant) {
+    fn read_error(&mut self, latch: &mut Latch, vitals: &Vitals) {
         let before = core::mem::replace(&mut self.error_code, vitals.error_code);
         let changed = before != vitals.error_code;
-        guard.latch(now, |latch| latch.report(vitals.error, changed, self.config));
+        latch.report(vitals.error, changed, self.config);
     }
 
     pub(crate) fn health(&self, motor: MotorName, guard: &Guard, vitals: &Vitals) -> Health {

@@ -5,13 +5,15 @@ use crate::meter::instructions;
 use crate::report::row;
 use crate::wiring::START;
 use core::hint::black_box;
-use drivetrain::control::PidConfig;
+use drivetrain::control::{Pid, PidConfig};
 use drivetrain::damiao::{Model, Motor};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Devices, ImpedanceControl, Ingest, Own, VelocityDrive};
 use drivetrain::sim::DamiaoDrive;
-use drivetrain::time::{Duration, Instant, Tick};
+use drivetrain::time::{Duration, Instant, Tick, TimeStep};
 use drivetrain::units::AngularVelocity;
+use drivetrain::wire::mit::{self, Ranges};
+use embedded_can::{Frame, Id};
 
 const MOTORS: usize = 8;
 
@@ -108,6 +110,53 @@ fn joints_ingest(joints: &mut Joints, answers: &[CanFrame; MOTORS], now: Instant
     }
 }
 
+/// A joint without link, arming, ages, health or power: what the rules of a motor cost is the difference.
+pub struct Bare {
+    measured: mit::Feedback,
+    speed: Pid,
+}
+
+/// The same work without a rule: feedback in by the place of its id, the plain speed loop, a torque out.
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn joints_bare(
+    joints: &mut [Bare; MOTORS],
+    answers: &[CanFrame; MOTORS],
+    ranges: &Ranges,
+    dt_s: f32,
+) {
+    for answer in answers {
+        let (Id::Standard(id), &[head, a, b, c, d, e, ..]) = (answer.id(), answer.data()) else {
+            continue;
+        };
+        let place = usize::from(id.as_raw()).wrapping_sub(0x11);
+        let Some(joint) = joints.get_mut(place) else { continue };
+        if usize::from(head & 0xF) == place + 1 {
+            joint.measured = ranges.decode_feedback(&[a, b, c, d, e]);
+        }
+    }
+    let step = TimeStep::of(dt_s);
+    for (id, joint) in (1..).zip(joints) {
+        let torque_nm = joint.speed.step(1.0, joint.measured.velocity_rad_per_s, &step);
+        let data = ranges.encode(&mit::Command::torque(torque_nm));
+        black_box(&CanFrame::standard(id, data));
+    }
+}
+
+fn bare() -> u32 {
+    let answers = Arm::new(false, true, 1, START).answers.map(Option::unwrap);
+    let speed = PidConfig::new(0.8, 4.0, 0.001).with_output_limit(3.0);
+    let mut joints = [(); MOTORS].map(|()| Bare {
+        measured: mit::Feedback::default(),
+        speed: Pid::new(speed).unwrap(),
+    });
+    let ranges = Ranges::new(12.5, 30.0, 10.0).unwrap();
+    let function = joints_bare as fn(&mut [Bare; MOTORS], &[CanFrame; MOTORS], &Ranges, f32);
+    let figure = instructions(function, |tick, _| tick(&mut joints, &answers, &ranges, 0.001));
+    assert!(joints.iter().all(|joint| joint.speed.output() != 0.0));
+    figure
+}
+
 /// Commands do not arrive here, so the drives answer with what they had: the targets are the same in each cycle.
 fn tick(is_shared: bool, is_armed: bool) -> u32 {
     let Arm { mut joints, answers, now, .. } = Arm::new(is_shared, is_armed, 1, START);
@@ -132,6 +181,7 @@ fn ingest(is_shared: bool, from: u8, start: Instant) -> u32 {
 
 pub fn rows() {
     row("joints_tick", &[tick(false, true)]);
+    row("joints_bare", &[bare()]);
     row("joints_tick_shared", &[tick(true, true)]);
     row("joints_disarmed", &[tick(false, false)]);
     row("joints_ingest", &[ingest(false, 1, START)]);

@@ -11,6 +11,24 @@ use embedded_can::Frame;
 /// The time between two questions for a setting.
 const INQUIRY: Duration = Duration::from_millis(10);
 
+/// The frame of the last update: a command, rest, or a frame in the place of either.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Offered {
+    /// `None` before the first.
+    frame: Option<CanFrame>,
+    /// The frame is still to be taken.
+    waits: bool,
+    /// A command, which an update without a step may send once more.
+    pub(super) may_repeat: bool,
+    /// Rest, not given back by the driver.
+    is_rest: bool,
+}
+
+impl Offered {
+    pub(super) const NOTHING: Self =
+        Self { frame: None, waits: false, may_repeat: false, is_rest: false };
+}
+
 impl<M: OwnMotor> CanDevice for Own<M> {
     #[inline]
     fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
@@ -30,9 +48,10 @@ impl<M: OwnMotor> CanDevice for Own<M> {
         let drives = self.guard.drives(tick.now());
         if drives && !step.is_hold() && self.is_steady() {
             self.power.pass(tick.now());
-            self.withdraw(|own| &mut own.command);
+            self.withdraw();
             self.has_posted = false;
-            self.command = Some(self.follow(step, left));
+            let frame = Some(self.follow(step, left));
+            self.offered = Offered { frame, waits: true, may_repeat: true, is_rest: false };
             return;
         }
         self.update_anyhow(drives, step, left, tick.now());
@@ -43,17 +62,13 @@ impl<M: OwnMotor> CanDevice for Own<M> {
         if self.switching.is_some() {
             return self.switching.take();
         }
-        if self.command.is_some() {
-            self.last = self.command.take();
-            return self.last;
-        }
-        None
+        if core::mem::take(&mut self.offered.waits) { self.offered.frame } else { None }
     }
 
     /// Each update offers the newest command anyway. A frame for the drive's power comes again if still wanted.
     fn requeue(&mut self, frame: &CanFrame) -> bool {
         // Of an id that several motors send, only the frames that this one sent.
-        let is_known = [self.switched, self.last].contains(&Some(*frame));
+        let is_known = [self.switched, self.offered.frame].contains(&Some(*frame));
         // Once: a poll may have the same bytes.
         if self.switched.take_if(|switched| switched == frame).is_some() {
             self.give_back();
@@ -70,7 +85,7 @@ impl<M: OwnMotor> CanDevice for Own<M> {
             self.leave_out(frame);
         }
         // Rest that was not sent gives way to no other frame.
-        self.rested = self.rested.filter(|rest| rest != frame);
+        self.offered.is_rest &= self.offered.frame != Some(*frame);
         is_own
     }
 
@@ -148,31 +163,33 @@ impl<M: OwnMotor> Own<M> {
     /// Tells whether the drive is enabled, and no frame but a command is due: the case of almost each cycle of a driven motor.
     #[inline]
     fn is_steady(&self) -> bool {
-        let waits = self.switched.is_some() || self.switching.is_some() || self.rested.is_some();
+        let waits = self.switched.is_some() || self.switching.is_some() || self.offered.is_rest;
         self.power.is_steady() && self.was_online && !waits
     }
 
     /// Enables, disables, asks, commands and rests, as the motor may be driven or not.
     #[inline(never)]
     fn update_anyhow(&mut self, drives: bool, step: TimeStep, left: f32, now: Instant) {
-        let may_drive = drives && !(step.is_hold() && self.held.is_none());
+        let may_drive = drives && (!step.is_hold() || self.offered.may_repeat);
         // A question that is given back from now on did not enable the drive, and rest that nobody took was not sent.
         self.switched.take_if(|_| self.power.is_confirmed());
-        self.rested.take_if(|_| self.command.is_some());
-        self.withdraw(|own| &mut own.command);
+        self.offered.is_rest &= !self.offered.waits;
+        self.withdraw();
         self.has_posted = false;
         let was_on = self.power.is_on();
         self.switch(may_drive, now);
         // Before the drive was on for certain, it was polled where rest would have disabled it.
-        self.rested.take_if(|_| was_on && !self.power.is_on());
+        self.offered.is_rest &= !was_on || self.power.is_on();
         let inquiry = self.inquire(now);
         let is_at_rest = !may_drive || !self.power.is_ready();
         let command = self.act(may_drive, step, left);
         // Between two frames of rest, another frame takes the place of one: the bus never has two of them at once to carry.
         let has_other = self.has_posted || inquiry.is_some();
-        let gives_way = is_at_rest && self.rested.is_some() && has_other;
+        let gives_way = is_at_rest && self.offered.is_rest && has_other;
         self.offer(if gives_way { inquiry } else { command });
-        self.rested = command.filter(|frame| is_at_rest && !gives_way && !frame.is_remote());
+        self.offered.may_repeat = !is_at_rest && !step.is_hold();
+        let is_rest = |frame: CanFrame| is_at_rest && !gives_way && !frame.is_remote();
+        self.offered.is_rest = command.is_some_and(is_rest);
     }
 
     /// Checks the health of the motor and takes the reactions, which may relax the motor; returns the share of the output left.
@@ -193,7 +210,7 @@ impl<M: OwnMotor> Own<M> {
         if was_online && !self.was_online {
             self.motor.forget_settings();
         }
-        let is_idle = !self.power.is_on() && !self.has_posted && self.rested.is_some();
+        let is_idle = !self.power.is_on() && !self.has_posted && self.offered.is_rest;
         let is_due = now < self.inquired || now.since(self.inquired) >= INQUIRY;
         if !is_idle || !is_due || self.motor.is_enabled() == Some(true) {
             return None;
@@ -215,7 +232,7 @@ impl<M: OwnMotor> Own<M> {
         if stays && !may_drive {
             if self.switching.is_some() {
                 self.give_back();
-                self.withdraw(|own| &mut own.switching);
+                self.withdraw_switching();
             }
             return;
         }
@@ -242,7 +259,7 @@ impl<M: OwnMotor> Own<M> {
             self.has_posted = true;
             return;
         }
-        self.withdraw(|own| &mut own.switching);
+        self.withdraw_switching();
         let frame = self.motor.enable(self.enabling);
         self.enabling = self.enabling.saturating_add(1);
         if frame.is_some() {
@@ -252,7 +269,7 @@ impl<M: OwnMotor> Own<M> {
     }
 
     fn disable(&mut self) {
-        self.withdraw(|own| &mut own.switching);
+        self.withdraw_switching();
         let frame = self.motor.disable();
         self.rest_disables = frame.is_none();
         self.post(frame);
@@ -285,7 +302,6 @@ impl<M: OwnMotor> Own<M> {
             if !self.guard.has_target() {
                 self.relax();
             }
-            self.held = None;
             let is_enabling = may_drive && self.switched.is_some();
             if is_enabling && self.rest_disables {
                 return self.motor.poll();
@@ -293,7 +309,7 @@ impl<M: OwnMotor> Own<M> {
             return Some(self.rest());
         }
         if step.is_hold() {
-            return self.held.take();
+            return self.offered.frame;
         }
         Some(self.follow(step, left))
     }
@@ -304,9 +320,8 @@ impl<M: OwnMotor> Own<M> {
         self.is_resting = false;
         let opened = self.guard.share();
         let target = if opened < 1.0 { self.goal(opened) } else { self.target };
-        let command = self.motor.control(Order { target, share: left.min(opened), step });
-        self.held = Some(command);
-        command
+        let share = if left < opened { left } else { opened };
+        self.motor.control(Order { target, share, step })
     }
 
     /// Returns the target; an angle on its way from where the shaft was, as far as the output range is open.
@@ -350,11 +365,11 @@ impl<M: OwnMotor> Own<M> {
         self.relax();
         if self.power.stop() {
             self.disable();
-        } else if self.rested.is_some() {
+        } else if self.offered.is_rest {
             // At rest already: a program that disarms in each tick must not keep the questions from their turn.
             return;
         }
-        self.rested = None;
+        self.offered.is_rest = false;
         let rest = self.rest();
         self.offer(Some(rest));
     }
@@ -362,17 +377,26 @@ impl<M: OwnMotor> Own<M> {
     /// Returns the frame of rest: no question unless rest was sent before.
     fn rest(&mut self) -> CanFrame {
         let frame = self.motor.rest();
-        if frame.is_remote() && self.rested.is_none() { self.motor.rest() } else { frame }
+        if frame.is_remote() && !self.offered.is_rest { self.motor.rest() } else { frame }
     }
 
     fn offer(&mut self, command: Option<CanFrame>) {
-        self.withdraw(|own| &mut own.command);
-        self.command = command;
+        self.withdraw();
+        let frame = command.or(self.offered.frame);
+        self.offered =
+            Offered { frame, waits: command.is_some(), may_repeat: false, is_rest: false };
     }
 
     /// Takes back a frame still waiting for the bus.
-    fn withdraw(&mut self, place: impl FnOnce(&mut Self) -> &mut Option<CanFrame>) {
-        if let Some(frame) = place(self).take() {
+    fn withdraw(&mut self) {
+        if let (true, Some(frame)) = (core::mem::take(&mut self.offered.waits), self.offered.frame)
+        {
+            self.leave_out(&frame);
+        }
+    }
+
+    fn withdraw_switching(&mut self) {
+        if let Some(frame) = self.switching.take() {
             self.leave_out(&frame);
         }
     }

@@ -31,6 +31,7 @@ use super::{
 use crate::frame::CanFrame;
 use crate::time::{Duration, Instant};
 use crate::units::{Angle, AngularVelocity};
+use device::Offered;
 use embedded_can::Frame;
 use power::Power;
 use route::Route;
@@ -110,20 +111,14 @@ pub struct Own<M> {
     /// The velocity of the shaft when a velocity target was followed first.
     start_velocity: Option<AngularVelocity>,
     is_resting: bool,
-    /// The last command. An update without a step may send this frame once more.
-    held: Option<CanFrame>,
-    /// The frames waiting to be sent: a frame for the drive's power, and the command.
+    offered: Offered,
+    /// A frame for the drive's power, waiting to be sent before the other.
     switching: Option<CanFrame>,
-    command: Option<CanFrame>,
     /// This update offers a frame for the drive's power.
     has_posted: bool,
-    /// The frame of rest offered by the last update, unless the driver gave it back.
-    rested: Option<CanFrame>,
     was_online: bool,
     /// The time of the last question.
     inquired: Instant,
-    /// The last frame taken, but for the drive's power.
-    last: Option<CanFrame>,
     /// The last frame for the drive's power, sent or not.
     switched: Option<CanFrame>,
     /// How many frames were sent to enable the drive since the order to disable the drive.
@@ -149,13 +144,10 @@ impl<M: OwnMotor> Own<M> {
             start: None,
             start_velocity: None,
             is_resting: true,
-            held: None,
+            offered: Offered::NOTHING,
             switching: None,
-            command: None,
             has_posted: false,
-            rested: None,
             was_online: false,
-            last: None,
             inquired: Instant::START,
             switched: None,
             enabling: 0,
@@ -269,7 +261,7 @@ impl<M: OwnMotor> Own<M> {
             return Err(TargetError::Unsupported);
         }
         // Where there was no target, the command is of one before.
-        self.held = self.held.filter(|_| self.guard.has_target());
+        self.offered.may_repeat &= self.guard.has_target();
         self.guard.admit(is_finite)?;
         self.target = target;
         Ok(())

@@ -386,8 +386,11 @@ impl MotorGuard {
 
     /// Returns the open share of the output range, 0 to 1; 0 for a time before the beginning.
     pub(crate) fn share(&mut self, now: u32) -> f32 {
+        if !self.is_opening {
+            return 1.0;
+        }
         let (passed, whole) = (age(now, self.opened), u32::from(self.opening_ms) * 1_000);
-        self.is_opening = self.is_opening && passed < whole;
+        self.is_opening = passed < whole;
         if self.is_opening { passed as f32 / whole as f32 } else { 1.0 }
     }
 }
