@@ -288,6 +288,7 @@ impl OwnMotor for Motor {
         let [is_off, is_run] = [Command::Off, Command::Run].map(|it| it.encode() == *frame.bytes());
         self.echoes = self.echoes.saturating_sub((is_off || is_run).into());
         self.clears &= !is_off;
+        self.questions.unsent();
     }
 
     fn is_enabled(&self) -> Option<bool> {

@@ -202,6 +202,7 @@ impl OwnMotor for Motor {
         self.resets |= command == Command::Reset.encode();
         let timeout = self.timeout.map(|ms| Command::SetTimeout(ms).encode());
         self.writes -= u8::from(self.writes > 0 && timeout == Some(command));
+        self.questions.unsent();
     }
 
     fn is_enabled(&self) -> Option<bool> {

@@ -9,8 +9,8 @@ const ROUND: u8 = 32;
 pub(crate) struct Questions<C> {
     /// The place within the round.
     place: u8,
-    /// The last command that was no question.
-    last: C,
+    /// The last command that was no question; `None` if not sent, so that the drive goes on with one before.
+    last: Option<C>,
     /// A question has waited for a new command.
     has_waited: bool,
 }
@@ -18,19 +18,26 @@ pub(crate) struct Questions<C> {
 impl<C: Copy + PartialEq> Questions<C> {
     /// Takes the command of a drive at rest.
     pub(crate) const fn new(rest: C) -> Self {
-        Self { place: 1, last: rest, has_waited: false }
+        Self { place: 1, last: Some(rest), has_waited: false }
     }
 
     /// Returns a command, or the question due in its place.
     pub(crate) fn next(&mut self, command: C, due: impl FnOnce(u8) -> Option<C>) -> C {
         let due = due(self.place);
-        let question = due.filter(|_| self.has_waited || command == self.last);
+        let question = due.filter(|_| self.has_waited || self.last == Some(command));
         self.has_waited = question.is_none() && due.is_some();
         if !self.has_waited {
             self.place = (self.place + 1) % ROUND;
         }
-        self.last = question.map_or(command, |_| self.last);
+        if question.is_none() {
+            self.last = Some(command);
+        }
         question.unwrap_or(command)
+    }
+
+    /// A frame was not sent: the next command goes first.
+    pub(crate) const fn unsent(&mut self) {
+        self.last = None;
     }
 }
 
