@@ -1,6 +1,6 @@
 //! The motor as a device of the runner.
 
-use super::{Impedance, Order, Own, OwnMotor, Target};
+use super::{Impedance, Offered, Order, Own, OwnMotor, Target};
 use crate::frame::CanFrame;
 use crate::math::wrap_pi;
 use crate::motor::{CanDevice, Claim, Edge, Ingest, Link, MotorName, Role, WrongSetting};
@@ -10,24 +10,6 @@ use embedded_can::Frame;
 
 /// The time between two questions for a setting.
 const INQUIRY: Duration = Duration::from_millis(10);
-
-/// The frame of the last update: a command, rest, or a frame in the place of either.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Offered {
-    /// `None` before the first.
-    frame: Option<CanFrame>,
-    /// The frame is still to be taken.
-    waits: bool,
-    /// A command, which an update without a step may send once more.
-    pub(super) may_repeat: bool,
-    /// Rest, not given back by the driver.
-    is_rest: bool,
-}
-
-impl Offered {
-    pub(super) const NOTHING: Self =
-        Self { frame: None, waits: false, may_repeat: false, is_rest: false };
-}
 
 impl<M: OwnMotor> CanDevice for Own<M> {
     #[inline]

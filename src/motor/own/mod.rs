@@ -31,7 +31,6 @@ use super::{
 use crate::frame::CanFrame;
 use crate::time::{Duration, Instant};
 use crate::units::{Angle, AngularVelocity};
-use device::Offered;
 use embedded_can::Frame;
 use power::Power;
 use route::Route;
@@ -128,6 +127,23 @@ pub struct Own<M> {
     superseded: u32,
     /// The last command of another node.
     rival: Option<Claim>,
+}
+
+/// The frame of the last update: a command, rest, or a frame in the place of either.
+#[derive(Debug, Clone, Copy)]
+struct Offered {
+    /// `None` before the first.
+    frame: Option<CanFrame>,
+    /// The frame is still to be taken.
+    waits: bool,
+    /// A command, which an update without a step may send once more.
+    may_repeat: bool,
+    /// Rest, not given back by the driver.
+    is_rest: bool,
+}
+
+impl Offered {
+    const NOTHING: Self = Self { frame: None, waits: false, may_repeat: false, is_rest: false };
 }
 
 impl<M: OwnMotor> Own<M> {
