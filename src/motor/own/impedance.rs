@@ -198,6 +198,7 @@ impl ImpedanceControl {
     }
 
     /// Returns the impedance of a target.
+    #[inline(always)]
     fn wanted(&mut self, order: Order, (angle, velocity): Shaft) -> Option<Impedance> {
         let torque = |torque_nm| Impedance { torque_nm, ..Impedance::FREE };
         if let Some(loops) = &mut self.loops {
@@ -268,7 +269,7 @@ impl TorqueLoops {
     /// Returns the torque for a velocity or an angle, possibly more than the limit; `None` for another target, and for an angle
     /// target without a measured angle. The integral keeps within the limit. The loops take over from a torque without a jump, and
     /// begin anew after an impedance.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn step(
         &mut self,
         order: Order,

@@ -143,7 +143,7 @@ impl ControlMode {
 
     /// Returns the goal of a drive that follows an impedance in fields of these ranges, with counts to `top`, of the position to
     /// 65535; `None` to rest.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn impedance_goal(
         &mut self,
         order: Order,
