@@ -44,13 +44,17 @@ impl<M: OwnMotor> CanDevice for Own<M> {
         if self.switching.is_some() {
             return self.switching.take();
         }
-        if core::mem::take(&mut self.offered.waits) { self.offered.frame } else { None }
+        if core::mem::take(&mut self.offered.waits) {
+            self.last = self.offered.frame;
+            return self.last;
+        }
+        None
     }
 
     /// Each update offers the newest command anyway. A frame for the drive's power comes again if still wanted.
     fn requeue(&mut self, frame: &CanFrame) -> bool {
         // Of an id that several motors send, only the frames that this one sent.
-        let is_known = [self.switched, self.offered.frame].contains(&Some(*frame));
+        let is_known = [self.switched, self.last].contains(&Some(*frame));
         // Once: a poll may have the same bytes.
         if self.switched.take_if(|switched| switched == frame).is_some() {
             self.give_back();

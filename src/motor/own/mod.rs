@@ -111,6 +111,8 @@ pub struct Own<M> {
     start_velocity: Option<AngularVelocity>,
     is_resting: bool,
     offered: Offered,
+    /// The last frame taken, but for the drive's power.
+    last: Option<CanFrame>,
     /// A frame for the drive's power, waiting to be sent before the other.
     switching: Option<CanFrame>,
     /// This update offers a frame for the drive's power.
@@ -161,6 +163,7 @@ impl<M: OwnMotor> Own<M> {
             start_velocity: None,
             is_resting: true,
             offered: Offered::NOTHING,
+            last: None,
             switching: None,
             has_posted: false,
             was_online: false,

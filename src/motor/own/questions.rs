@@ -35,9 +35,9 @@ impl<C: Copy + PartialEq> Questions<C> {
         question.unwrap_or(command)
     }
 
-    /// A frame was not sent: the next command goes first.
+    /// A frame was not sent: the next command goes first, also before a question that has waited.
     pub(crate) const fn unsent(&mut self) {
-        self.last = None;
+        (self.last, self.has_waited) = (None, false);
     }
 }
 
