@@ -146,10 +146,8 @@ fn joints_bare(
 fn bare() -> u32 {
     let answers = Arm::new(false, true, 1, START).answers.map(Option::unwrap);
     let speed = PidConfig::new(0.8, 4.0, 0.001).with_output_limit(3.0);
-    let mut joints = [(); MOTORS].map(|()| Bare {
-        measured: mit::Feedback::default(),
-        speed: Pid::new(speed).unwrap(),
-    });
+    let mut joints = [(); MOTORS]
+        .map(|()| Bare { measured: mit::Feedback::default(), speed: Pid::new(speed).unwrap() });
     let ranges = Ranges::new(12.5, 30.0, 10.0).unwrap();
     let function = joints_bare as fn(&mut [Bare; MOTORS], &[CanFrame; MOTORS], &Ranges, f32);
     let figure = instructions(function, |tick, _| tick(&mut joints, &answers, &ranges, 0.001));
