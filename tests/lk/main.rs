@@ -11,11 +11,11 @@ use drivetrain::control::PidConfig;
 use drivetrain::frame::CanFrame;
 use drivetrain::lk::{Mode, Model, Motor, Series};
 use drivetrain::motor::{
-    AngleDrive, Condition, Devices, Impedance, ImpedanceControl, Ingest, Link, Order, Own,
-    OwnMotor, Target, VelocityDrive,
+    AngleDrive, Condition, Devices, Impedance, ImpedanceControl, Ingest, Link, Own, OwnMotor,
+    VelocityDrive,
 };
 use drivetrain::sim::DriveShaft;
-use drivetrain::time::{Instant, Tick, TimeStep};
+use drivetrain::time::{Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use std::f32::consts::TAU;
 

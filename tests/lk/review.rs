@@ -107,23 +107,3 @@ fn off_goes_before_an_error_is_cleared_also_when_the_driver_gave_it_back() {
     let sent = [motor.disable(), motor.disable(), motor.disable()];
     assert_eq!(sent.map(|frame| frame.unwrap().bytes()[0]), [0x80, 0x9B, 0x80]);
 }
-
-/// While a drive answers a question, it goes on with its last command. If that command was not sent, the drive has an older one.
-#[test]
-fn a_question_never_follows_a_command_that_was_not_sent() {
-    let mut motor = Motor::new(Model::MF9025_16T, 1, torque()).unwrap();
-    let step = TimeStep::of(0.001);
-    let order = Order { target: Target::Torque(1.0), share: 1.0, step };
-    let (mut questions, mut is_lost) = (0, false);
-    for count in 0..300 {
-        let frame = motor.control(order);
-        let is_question = frame.bytes()[0] != 0xA1;
-        assert!(!(is_question && is_lost), "{count}: {frame:?}");
-        questions += i32::from(is_question);
-        is_lost = count % 5 < 2;
-        if is_lost {
-            motor.unsent(&frame);
-        }
-    }
-    assert!(questions > 5, "{questions}");
-}

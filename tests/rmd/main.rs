@@ -11,11 +11,11 @@ use drivetrain::control::PidConfig;
 use drivetrain::error::ConfigError;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    AngleDrive, Condition, Devices, Impedance, ImpedanceControl, Ingest, Link, Malformed, Order,
-    Own, OwnMotor, Target, Timeouts, VelocityDrive,
+    AngleDrive, Condition, Devices, Impedance, ImpedanceControl, Ingest, Link, Malformed, Own,
+    OwnMotor, Timeouts, VelocityDrive,
 };
 use drivetrain::rmd::{Mode, Model, Motor};
-use drivetrain::time::{Duration, Instant, Tick, TimeStep};
+use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use embedded_can::Frame;
 use std::f32::consts::TAU;
