@@ -5,7 +5,7 @@ use crate::dji::model::{ALL_FACTS, Range};
 use crate::dji::{Config, Gm6020Voltage};
 use crate::math::tests::every_f32;
 
-/// A scale, and the ranges of a motor that has all of it, or less than a third and one direction.
+/// A scale, and two ranges of a motor: the whole scale, and less than a third of the scale in one direction.
 #[derive(Debug, Clone, Copy)]
 struct Case {
     raw_per_unit: f32,
