@@ -430,9 +430,6 @@ fn no_family_has_a_safety_rule_of_its_own() {
 /// The types whose inherent methods stand in at most this many files.
 const MOST_FILES_OF_A_TYPE: usize = 2;
 
-/// A type that still has three.
-const SCATTERED: [(&str, &str); 1] = [("runner", "Runner")];
-
 /// The types that have an inherent `impl` in a text.
 fn inherent(text: &str) -> Vec<String> {
     let name = |line: &str| {
@@ -474,10 +471,7 @@ fn the_inherent_methods_of_a_type_stand_in_at_most_two_files() {
         }
     }
     assert!(files.len() > 100, "the check finds the types");
-    files.retain(|(module, name), files| {
-        let is_known = SCATTERED.contains(&(module.as_str(), name.as_str()));
-        files.len() > if is_known { 4 } else { MOST_FILES_OF_A_TYPE }
-    });
+    files.retain(|_, files| files.len() > MOST_FILES_OF_A_TYPE);
     assert!(files.is_empty(), "{files:#?}");
 }
 

@@ -13,9 +13,9 @@
 //! pending frames implements [`AbortPending`], and [`NbAbort`] then leaves no frame older than one period.
 //!
 //! # Supervision
-//! A bus down or silent, overruns and a standing clock are latched as [`ConditionEdge`]s beside those of the motors;
-//! [`Runner::next_edge`] returns these edges. [`Runner::heartbeat`] is for the hardware watchdog, the only remedy when the
-//! loop itself stops.
+//! A bus down or silent, overruns and a standing clock are latched as [`ConditionEdge`](crate::time::ConditionEdge)s
+//! beside those of the motors; [`Runner::next_edge`] returns these edges. [`Runner::heartbeat`] is for the hardware watchdog,
+//! the only remedy when the loop itself stops.
 //!
 //! Nothing here is needed: a program can call [`Devices`] itself, as the examples `sans_io` and `async_sans_io` do.
 
@@ -23,23 +23,28 @@ mod port;
 #[cfg(feature = "queue")]
 mod queue;
 mod statistics;
-mod stop;
+mod supervision;
 #[cfg(test)]
 mod tests;
 mod watch;
 
-pub use port::{BlockingTx, Nb, Port};
+pub use port::{AbortPending, BlockingTx, Nb, NbAbort, Port};
 #[cfg(feature = "queue")]
 pub use queue::{FrameQueue, FrameReceiver, FrameSender};
 pub use statistics::{ErrorCounts, Statistics};
-pub use stop::{AbortPending, EmergencyStop, NbAbort};
+pub use supervision::EmergencyStop;
 pub use watch::BusCondition;
 
 use crate::frame::CanFrame;
-use crate::motor::{ArmError, Ask, Devices};
-use crate::time::{Clock, ConditionEdge, Duration, Instant, Tick, Ticker};
-use statistics::{Meter, increment};
-use watch::Watch;
+use crate::motor::{Devices, Ingest};
+use crate::time::{Clock, Duration, Instant, Tick, Ticker};
+use port::{Received, Sending};
+use statistics::{Meter, Tally, increment};
+use watch::{Watch, together};
+
+/// Number of frames for one reading of the clock: frames in the driver arrived before the reading, and frames arriving
+/// meanwhile look older by the processing time of the others.
+const FRAMES_A_READING: usize = 16;
 
 /// Moves frames between a driver and a device, at the pace of a clock.
 ///
@@ -117,88 +122,207 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         self
     }
 
-    /// Sets the number of readings in a row without a later time after which the clock counts as standing, at least 1,
-    /// instead of the limit learned by [`due`](Self::due).
+    /// Takes at most `budget` received frames from the driver; frames of others are dropped. Returns how many came.
     ///
-    /// If the clock counts in coarse ticks, choose several times the number of readings within one of them: a step by mistake
-    /// relaxes every motor.
+    /// Costs 535 instructions on a Cortex-M4F, for 8 frames of motors (`docs/figures.md`).
+    pub fn poll(&mut self, budget: usize) -> usize {
+        self.poll_with(budget, |_| {})
+    }
+
+    /// Takes at most `budget` received frames from the driver and hands frames of others to `unrelated`. Returns the
+    /// number of frames.
+    ///
+    /// Never waits, continues after errors, and ends: an error counts against the budget as well. The clock is read for
+    /// each 16 frames: a frame has the time of the first of its 16.
+    pub fn poll_with(&mut self, budget: usize, mut unrelated: impl FnMut(&CanFrame)) -> usize {
+        self.watch.receive_ran();
+        let (mut frame, mut now) = (CanFrame::EMPTY, Instant::START);
+        let mut tally = Tally::default();
+        // Frames of other kinds do not count towards the frames of a reading.
+        let (mut frames, mut foreign) = (0, 0);
+        for _ in 0..budget {
+            match self.port.try_receive(&mut frame) {
+                Received::Frame => {
+                    if frames % FRAMES_A_READING == 0 {
+                        now = self.read_clock();
+                    }
+                    frames += 1;
+                    if self.take(&frame, now, &mut tally) == Ingest::Unrelated {
+                        unrelated(&frame);
+                    }
+                }
+                Received::Foreign => {
+                    foreign += 1;
+                    increment(&mut self.statistics.unrelated);
+                }
+                Received::Empty => break,
+                Received::Failed(kind) => self.note_failure(kind),
+            }
+        }
+        self.enter(frames, &tally);
+        // Frames since the last reading.
+        let waited = frames.checked_sub(1).map_or(0, |before| before % FRAMES_A_READING + 1);
+        self.watch.standstill.receive(waited);
+        frames + foreign
+    }
+
+    /// Takes at most `budget` frames from a queue, with the times of their arrival; drops frames of others. Returns the
+    /// number of frames.
+    #[cfg(feature = "queue")]
+    pub fn poll_queue(&mut self, queue: &mut FrameReceiver<'_>, budget: usize) -> usize {
+        self.poll_queue_with(queue, budget, |_| {})
+    }
+
+    /// Takes at most `budget` frames from a queue, with the times of their arrival, and hands frames of others to
+    /// `unrelated`. Returns the number of frames.
+    ///
+    /// Frames dropped by the queue since the last call are noted as [`lost`](Statistics::lost).
     ///
     /// # Examples
-    /// A loop that waits 10 ms in each turn, for a clock in microseconds: zeros go out 0.2 s after the clock stopped.
     /// ```
-    /// use drivetrain::dji::Bus;
-    /// use drivetrain::runner::{Nb, Runner};
-    /// use drivetrain::time::{Duration, Instant, ManualClock};
+    /// use drivetrain::dji::{Bus, Config, M3508};
+    /// use drivetrain::frame::CanFrame;
+    /// use drivetrain::runner::{BusCondition, FrameQueue, Nb, Runner};
+    /// use drivetrain::time::{Instant, ManualClock};
     /// # use drivetrain::sim::Simulation;
     /// # let world = Simulation::new(1);
     /// # let can = world.controller();
     ///
-    /// let clock = ManualClock::new(Instant::START);
-    /// let mut runner = Runner::new(Nb(can), &clock, Bus::new())
-    ///     .with_period(Duration::from_millis(10))
-    ///     .with_standstill_after(20);
-    /// for _ in 0..100 {
-    ///     clock.advance(Duration::from_millis(10));
-    ///     if let Some(tick) = runner.due() {
-    ///         runner.tick(tick);
-    ///     }
+    /// let clock = ManualClock::new(Instant::from_micros(9));
+    /// let mut bus = Bus::new();
+    /// bus.attach(Config::<M3508>::new(1))?;
+    /// let mut runner = Runner::new(Nb(can), &clock, bus);
+    /// let mut queue = FrameQueue::<4>::new();
+    /// let (mut interrupt, mut received) = queue.split();
+    /// let frame = CanFrame::standard(0x201, [0; 8]).ok_or("not an 11-bit id")?;
+    /// for at in 1..=5 {
+    ///     interrupt.push(&frame, Instant::from_micros(at)); // there is room for three
     /// }
-    /// assert!((1..20).all(|_| runner.due().is_none()));
-    /// assert!(runner.due().is_some_and(|tick| tick.dt_s() == 0.0));
+    /// assert_eq!(runner.poll_queue_with(&mut received, 16, |_| {}), 3);
+    /// assert_eq!(runner.statistics().lost, 2);
+    /// assert!(runner.has(BusCondition::ReceiveOverrun));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    #[must_use]
-    pub fn with_standstill_after(mut self, readings: u32) -> Self {
-        self.watch.standstill.fix(readings);
-        self
-    }
-
-    /// Sets the bit rate, in bits a second, for [`measured_load`](Self::measured_load); 1 000 000 at first.
-    #[must_use]
-    pub fn with_bit_rate(mut self, bits_per_s: u32) -> Self {
-        self.meter.set_bit_rate(bits_per_s);
-        self
-    }
-
-    /// Watches an emergency stop.
-    #[must_use]
-    pub fn with_emergency_stop(mut self, stop: &'static EmergencyStop) -> Self {
-        self.stop = Some(stop);
-        self
-    }
-
-    /// Arms the device: nothing moves before.
-    ///
-    /// # Errors
-    /// Names the reason, as [`Devices::arm`]; also a watched emergency stop, and a driver that takes no frames. If motors are
-    /// missing on a full bus, the error has the [measured load](Self::measured_load). A refused call counts as a request.
-    pub fn arm(&mut self, tick: Tick) -> Result<(), ArmError> {
-        let refusal = if self.stop.is_some_and(EmergencyStop::is_set) {
-            ArmError::Stopped
-        } else if self.is_bus_down() {
-            ArmError::BusDown
-        } else {
-            return self.device.arm(tick.now()).map_err(|refusal| match refusal {
-                ArmError::Missing(missing) => ArmError::Missing(missing.on_bus(self.meter.last())),
-                other => other,
-            });
-        };
-        // A refused request is a request.
-        Ask::of(&mut self.device);
-        Err(refusal)
-    }
-
-    /// Returns whether every motor takes targets; see [`Devices::is_armed`].
-    #[must_use]
-    pub fn is_armed(&mut self) -> bool {
-        self.device.is_armed()
-    }
-
-    /// Clears the watched emergency stop and the stop of the device. The device stays disarmed.
-    pub fn clear_emergency_stop(&mut self) {
-        if let Some(stop) = self.stop {
-            stop.clear();
+    #[cfg(feature = "queue")]
+    pub fn poll_queue_with(
+        &mut self,
+        queue: &mut FrameReceiver<'_>,
+        budget: usize,
+        mut unrelated: impl FnMut(&CanFrame),
+    ) -> usize {
+        self.watch.receive_ran();
+        self.note_lost(queue.take_dropped());
+        let (mut tally, mut frames) = (Tally::default(), 0);
+        while frames < budget {
+            let Some((frame, arrived)) = queue.pop() else { break };
+            frames += 1;
+            if self.take(&frame, arrived, &mut tally) == Ingest::Unrelated {
+                unrelated(&frame);
+            }
         }
-        self.device.clear_emergency_stop();
+        self.enter(frames, &tally);
+        self.watch.standstill.receive(frames);
+        frames
+    }
+
+    /// Takes one frame received elsewhere, for example in an interrupt, with the time of its arrival.
+    pub fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
+        let mut tally = Tally::default();
+        let outcome = self.take(frame, now, &mut tally);
+        self.enter(1, &tally);
+        self.watch.standstill.receive(1);
+        outcome
+    }
+
+    #[inline(always)]
+    fn take(&mut self, frame: &CanFrame, now: Instant, tally: &mut Tally) -> Ingest {
+        if !frame.is_whole() {
+            self.meter.count_other(frame);
+            tally.others += 1;
+        }
+        let outcome = self.device.ingest(frame, now);
+        if outcome != Ingest::Taken {
+            tally.reject(outcome);
+        }
+        outcome
+    }
+
+    /// Counts the frames of one call.
+    #[expect(clippy::cast_possible_truncation, reason = "a budget of 2^32 frames takes a day")]
+    fn enter(&mut self, frames: usize, tally: &Tally) {
+        let frames = frames as u32;
+        self.meter.count_whole(frames.saturating_sub(tally.others));
+        if self.statistics.enter(frames, tally) > 0 {
+            self.watch.hear();
+        }
+    }
+
+    /// Reads the clock and returns the step that is due, if any.
+    ///
+    /// If the clock stands or goes back, a step with a `dt_s` of 0 is due: its update sends zeros and relaxes every motor
+    /// until armed again.
+    ///
+    /// A clock stands when too many readings in a row, by this method and by [`poll`](Self::poll), show no later time. The limit
+    /// is learned from the running clock: 100 times the most readings ever needed to show a later time, and at least 2 for each
+    /// microsecond of its resolution; from 1000 to 200 000, and 200 000 until the clock has advanced once. 1600 received frames
+    /// count as much as the limit.
+    ///
+    /// | loop | resolution of the clock | the step comes after |
+    /// |---|---|--:|
+    /// | polls 1 000 000 times a second | 1 µs | 1 ms |
+    /// | the same | 1 ms | 0.1 s |
+    /// | the same | 10 ms | 0.2 s |
+    /// | wakes up each 0.25 ms | 1 µs | 0.25 s |
+    /// | wakes up each ms | 1 µs | 1 s; 2 s if never early or late |
+    /// | the same | 1 ms | 2 s |
+    /// | the same | of a clock that has never moved | 200 s |
+    /// | wakes up for each frame of 4 motors at 1 kHz | 1 µs | 0.15 s |
+    ///
+    /// Slower loops set a limit of their own: [`with_standstill_after`](Self::with_standstill_after).
+    ///
+    /// A step that was not run stays due: further calls return the same step until [`tick`](Self::tick) or a sibling has run a
+    /// step. When the next step comes due before, the next step takes its place, with a `dt_s` that covers both, and the step
+    /// left out is an overrun; a step with a `dt_s` of 0 stays. So two runners can wait for each other:
+    /// `let (Some(one), Some(other)) = (one.due(), other.due()) else { continue };` loses none.
+    ///
+    /// Costs 125 instructions on a Cortex-M4F, when a step is due (`docs/figures.md`).
+    ///
+    /// Costs 132 instructions on a Cortex-M4F, when none is due (`docs/figures.md`).
+    pub fn due(&mut self) -> Option<Tick> {
+        let now = self.read_clock();
+        if self.watch.standstill.take() {
+            // Not after the last step that was run, so that the step does not count as advancing
+            // time.
+            let last = self.ticker.last();
+            let at = self.watch.ticked().map_or(last, |ticked| ticked.min(last));
+            self.waiting = Some(Tick::new(at, 0.0));
+            return self.waiting;
+        }
+        let before = self.ticker.overruns();
+        let next = self.ticker.due(now);
+        let mut is_late = self.ticker.overruns() != before;
+        if let Some(next) = next {
+            self.watch.standstill.restart(now);
+            is_late |= self.waiting.is_some();
+            self.waiting = Some(match self.waiting {
+                None => next,
+                Some(waiting) => {
+                    increment(&mut self.statistics.overruns);
+                    together(waiting, next)
+                }
+            });
+        }
+        if is_late {
+            self.watch.edges.begin(BusCondition::TickOverrun, now);
+        }
+        self.waiting
+    }
+
+    #[inline(never)]
+    fn read_clock(&mut self) -> Instant {
+        let now = self.clock.now();
+        self.watch.read(now);
+        now
     }
 
     /// Runs one step: update, then send. Drops frames of others that the driver evicts.
@@ -226,11 +350,11 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         if self.stop.is_some_and(EmergencyStop::is_set) {
             self.device.emergency_stop();
         }
-        self.call_back(tick.now(), &mut evicted);
+        self.sending(tick.now()).call_back(&mut evicted);
         self.device.update(tick);
         limit(&mut self.device);
         self.turn = self.turn.wrapping_add(1);
-        self.send(tick.now(), &mut evicted);
+        self.sending(tick.now()).send(&mut evicted);
         self.meter.finish(tick.now());
         if self.watch.finish(tick.now()) {
             increment(&mut self.statistics.bus_losses);
@@ -238,129 +362,11 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         }
     }
 
-    /// Calls back the frames offered in the tick before that did not leave; hands frames of others to `others`.
-    fn call_back(&mut self, now: Instant, others: &mut impl FnMut(&CanFrame)) {
-        let Self { port, device, statistics, meter, watch, .. } = self;
-        port.call_back(|frame| match frame {
-            Some(frame) if device.requeue(&frame) => {
-                increment(&mut statistics.evicted);
-                meter.discount(&frame);
-                watch.called_back(frame.header(), now);
-            }
-            frame => {
-                increment(&mut statistics.evicted_unrelated);
-                if let Some(frame) = frame {
-                    others(&frame);
-                }
-            }
-        });
-    }
-
-    fn count_sent(&mut self, frame: &CanFrame) {
-        increment(&mut self.statistics.sent);
-        self.meter.count(frame);
-    }
-
-    /// Returns the counters.
-    #[must_use]
-    pub fn statistics(&mut self) -> Statistics {
-        Statistics {
-            superseded: self.device.superseded(),
-            overruns: self.statistics.overruns.saturating_add(self.ticker.overruns()),
-            clock_standstills: self.watch.standstills,
-            clock_reversals: self.watch.reversals,
-            ..self.statistics.with_sums()
-        }
-    }
-
-    /// Returns whether some command frame was not sent for 100 ms, refused or given back by the driver; over when all are sent.
-    #[must_use]
-    pub const fn is_bus_down(&self) -> bool {
-        self.has(BusCondition::Down)
-    }
-
-    /// Returns whether something is wrong with the bus now.
-    #[must_use]
-    pub const fn has(&self, condition: BusCondition) -> bool {
-        self.watch.has(condition)
-    }
-
-    /// Returns the oldest unread edge of a [`BusCondition`], and removes it from the list.
-    ///
-    /// While an edge is unread, the same edge is not latched again, so no condition floods: [`Statistics`] has the numbers.
-    /// Two beginnings in a row mean that the condition ended in between. A change of one motor is an edge of that motor.
-    ///
-    /// # Examples
-    /// A second without a tick, and a second in time:
-    /// ```
-    /// use drivetrain::dji::Bus;
-    /// use drivetrain::runner::{Nb, Runner};
-    /// use drivetrain::time::{Duration, Instant, ManualClock};
-    /// # use drivetrain::sim::Simulation;
-    /// # let world = Simulation::new(1);
-    /// # let can = world.controller();
-    ///
-    /// let clock = ManualClock::new(Instant::START);
-    /// let mut runner = Runner::new(Nb(can), &clock, Bus::new());
-    /// runner.due();
-    /// clock.advance(Duration::from_secs(1));
-    /// for _ in 0..=1_000 {
-    ///     if let Some(tick) = runner.due() {
-    ///         runner.tick(tick);
-    ///     }
-    ///     clock.advance(Duration::from_millis(1));
-    /// }
-    /// let log: Vec<String> = core::iter::from_fn(|| runner.next_edge()).map(|edge| edge.to_string()).collect();
-    /// assert_eq!(log, ["tick overrun began at 1000000 us", "tick overrun ended at 2000000 us"]);
-    /// ```
-    pub fn next_edge(&mut self) -> Option<ConditionEdge<BusCondition>> {
-        self.watch.next_edge()
-    }
-
-    /// Takes all unread edges, the oldest first; see [`next_edge`](Self::next_edge).
-    pub fn edges(&mut self) -> impl Iterator<Item = ConditionEdge<BusCondition>> + '_ {
-        core::iter::from_fn(|| self.next_edge())
-    }
-
-    /// Returns a counter of the ticks in which the whole loop ran: received frames were polled since the tick before,
-    /// time advanced, every loop was updated, and every frame was offered to the driver. The counter wraps.
-    ///
-    /// Feed the hardware watchdog when the counter has changed, and only then: a hanging loop, for example in a driver
-    /// waiting for ever, lets the watchdog bite, and a reset program starts disarmed. A dead bus is no reason to reset,
-    /// so each part has to run, with or without work to do. [`poll`](Self::poll) and `poll_queue` count as polling; a
-    /// program that hands frames to [`ingest`](Self::ingest) also calls `poll(0)`.
-    ///
-    /// # Examples
-    /// ```
-    /// use drivetrain::dji::Bus;
-    /// use drivetrain::runner::{Nb, Runner};
-    /// use drivetrain::time::{Duration, Instant, ManualClock};
-    /// # use drivetrain::sim::Simulation;
-    /// # let world = Simulation::new(1);
-    /// # let can = world.controller();
-    /// # struct Watchdog { fed: u32 }
-    /// # impl Watchdog { fn feed(&mut self) { self.fed += 1; } }
-    /// # let mut watchdog = Watchdog { fed: 0 }; // independent, with a time-out of some ticks
-    ///
-    /// let clock = ManualClock::new(Instant::START);
-    /// let mut runner = Runner::new(Nb(can), &clock, Bus::new());
-    /// let mut beat = runner.heartbeat();
-    /// for _ in 0..100 {
-    ///     runner.poll(16);
-    ///     if let Some(tick) = runner.due() {
-    ///         runner.tick(tick);
-    ///     }
-    ///     if runner.heartbeat() != beat {
-    ///         beat = runner.heartbeat();
-    ///         watchdog.feed();
-    ///     }
-    ///     clock.advance(Duration::from_micros(100));
-    /// }
-    /// assert_eq!(watchdog.fed, 10); // once a tick
-    /// ```
-    #[must_use]
-    pub const fn heartbeat(&self) -> u32 {
-        self.watch.heartbeat
+    /// The parts that sending needs.
+    #[inline(always)]
+    const fn sending(&mut self, now: Instant) -> Sending<'_, P, D> {
+        let Self { port, device, statistics, meter, watch, yields, turn, .. } = self;
+        Sending { port, device, statistics, meter, watch, yields, turn: *turn, now }
     }
 
     /// Returns the device.

@@ -1,15 +1,14 @@
-//! Frames through the driver: received ones to the device, commands from it.
+//! The CAN drivers that a runner takes, and the frames of a tick on their way to the driver and back.
 
-#[cfg(feature = "queue")]
-use super::FrameReceiver;
-use super::statistics::{Tally, increment};
-use super::{BusCondition, Runner};
+use super::Statistics;
+use super::statistics::{Meter, increment};
+use super::watch::Watch;
 use crate::frame::CanFrame;
-use crate::motor::{Devices, Ingest};
-use crate::time::{Clock, Instant};
+use crate::motor::Devices;
+use crate::time::Instant;
 use embedded_can::{Error, ErrorKind};
 
-/// A CAN driver as the runner needs it: implemented by [`Nb`], [`NbAbort`](super::NbAbort) and [`BlockingTx`].
+/// A CAN driver as the runner needs it: implemented by [`Nb`], [`NbAbort`] and [`BlockingTx`].
 ///
 /// Several drivers implement both traits of `embedded-can`, whose methods have the same names, so the choice is a
 /// newtype. A driver with neither trait gets `embedded_can::nb::Can` by a newtype of its own.
@@ -114,9 +113,89 @@ impl<C: embedded_can::blocking::Can> Driver for BlockingTx<C> {
     }
 }
 
-/// Number of frames for one reading of the clock: frames in the driver arrived before the reading, and frames arriving
-/// meanwhile look older by the processing time of the others.
-const FRAMES_A_READING: usize = 16;
+/// A CAN driver that can abort frames pending in its controller, as bxCAN, FDCAN and MCP2515 allow.
+///
+/// `embedded-can` has no such call. Without it, if the plug is pulled while the motors are driven, a frame with the old
+/// currents stays in each mailbox and leaves when the bus is back. Implement the trait for the newtype around the driver, and
+/// give the runner `NbAbort(Nb(driver))`.
+pub trait AbortPending: embedded_can::nb::Can {
+    /// Aborts the transmission of all pending frames, and hands each aborted frame to `back`. Does not wait.
+    ///
+    /// A frame on the wire at that moment may still arrive; if the controller cannot tell, the frame is handed over too.
+    /// Frames in a queue of the driver count as pending as well.
+    fn abort_pending(&mut self, back: impl FnMut(Self::Frame));
+}
+
+/// A driver that implements [`AbortPending`]: as [`Nb`], and no command older than one period waits in the controller.
+///
+/// Before each update, every frame not sent since the tick before is called back. Frames of the device are offered again with the
+/// values of this update. Frames of others are not offered again: they go to the closure of
+/// [`Runner::tick_with`](super::Runner::tick_with), as evicted frames do. A bus that sends nothing for 100 ms is down, as if the
+/// driver refused every frame.
+///
+/// # Examples
+/// The plug is out for 5 ms while the current changes: with `Nb`, each mailbox would send an old frame afterwards.
+/// ```
+/// use drivetrain::dji::{Bus, Config, M3508};
+/// use drivetrain::frame::CanFrame;
+/// use drivetrain::runner::{AbortPending, Nb, NbAbort, Runner};
+/// use drivetrain::time::{Duration, Instant, ManualClock};
+/// # use embedded_can::ErrorKind;
+///
+/// /// A controller whose plug is out: nothing ever leaves.
+/// #[derive(Default)]
+/// struct Unplugged(Vec<CanFrame>);
+/// # impl embedded_can::nb::Can for Unplugged {
+/// #     type Frame = CanFrame;
+/// #     type Error = ErrorKind;
+/// #     fn transmit(&mut self, frame: &CanFrame) -> nb::Result<Option<CanFrame>, ErrorKind> {
+/// #         if self.0.len() == 3 { return Err(nb::Error::WouldBlock); }
+/// #         self.0.push(*frame);
+/// #         Ok(None)
+/// #     }
+/// #     fn receive(&mut self) -> nb::Result<CanFrame, ErrorKind> { Err(nb::Error::WouldBlock) }
+/// # }
+/// impl AbortPending for Unplugged {
+///     fn abort_pending(&mut self, back: impl FnMut(CanFrame)) {
+///         self.0.drain(..).for_each(back);
+///     }
+/// }
+///
+/// let clock = ManualClock::new(Instant::START);
+/// let mut bus = Bus::new();
+/// bus.attach(Config::<M3508>::new(1))?;
+/// let mut runner = Runner::new(NbAbort(Nb(Unplugged::default())), &clock, bus);
+/// for _ in 0..5 {
+///     clock.advance(Duration::from_millis(1));
+///     runner.poll(16);
+///     if let Some(tick) = runner.due() {
+///         runner.tick(tick);
+///     }
+/// }
+/// assert_eq!(runner.port_mut().0.0.0.len(), 1); // that of the last tick
+/// assert_eq!(runner.statistics().evicted, 4);
+/// # Ok::<(), drivetrain::dji::AttachError>(())
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct NbAbort<C>(pub Nb<C>);
+
+impl<C: AbortPending> Port for NbAbort<C> {}
+
+impl<C: AbortPending> Driver for NbAbort<C> {
+    #[inline(always)]
+    fn try_send(&mut self, frame: &CanFrame, evicted: &mut CanFrame) -> Sent {
+        self.0.try_send(frame, evicted)
+    }
+
+    #[inline]
+    fn try_receive(&mut self, frame: &mut CanFrame) -> Received {
+        self.0.try_receive(frame)
+    }
+
+    fn call_back(&mut self, mut back: impl FnMut(Option<CanFrame>)) {
+        self.0.0.abort_pending(|frame| back(CanFrame::copy_of(&frame)));
+    }
+}
 
 /// Upper bound on the frames of one tick, for devices with an endless supply of frames.
 const FRAMES_A_TICK: usize = 64;
@@ -125,184 +204,60 @@ const FRAMES_A_TICK: usize = 64;
 /// would fail an earlier change as well.
 const PATIENCE: u8 = 3;
 
-impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
-    /// Takes at most `budget` received frames from the driver; frames of others are dropped. Returns how many came.
-    ///
-    /// Costs 535 instructions on a Cortex-M4F, for 8 frames of motors (`docs/figures.md`).
-    pub fn poll(&mut self, budget: usize) -> usize {
-        self.poll_with(budget, |_| {})
-    }
-
-    /// Takes at most `budget` received frames from the driver and hands frames of others to `unrelated`. Returns the
-    /// number of frames.
-    ///
-    /// Never waits, continues after errors, and ends: an error counts against the budget as well. The clock is read for
-    /// each 16 frames: a frame has the time of the first of its 16.
-    pub fn poll_with(&mut self, budget: usize, mut unrelated: impl FnMut(&CanFrame)) -> usize {
-        self.watch.receive_ran();
-        let (mut frame, mut now) = (CanFrame::EMPTY, Instant::START);
-        let mut tally = Tally::default();
-        // Frames of other kinds do not count towards the frames of a reading.
-        let (mut frames, mut foreign) = (0, 0);
-        for _ in 0..budget {
-            match self.port.try_receive(&mut frame) {
-                Received::Frame => {
-                    if frames % FRAMES_A_READING == 0 {
-                        now = self.read_clock();
-                    }
-                    frames += 1;
-                    if self.take(&frame, now, &mut tally) == Ingest::Unrelated {
-                        unrelated(&frame);
-                    }
-                }
-                Received::Foreign => {
-                    foreign += 1;
-                    increment(&mut self.statistics.unrelated);
-                }
-                Received::Empty => break,
-                Received::Failed(kind) => self.note_failure(kind),
-            }
-        }
-        self.enter(frames, &tally);
-        // Frames since the last reading.
-        let waited = frames.checked_sub(1).map_or(0, |before| before % FRAMES_A_READING + 1);
-        self.watch.standstill.receive(waited);
-        frames + foreign
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn note_failure(&mut self, kind: ErrorKind) {
-        self.statistics.receive_errors.count(kind);
-        if kind == ErrorKind::Overrun {
-            let now = self.read_clock();
-            self.watch.edges.begin(BusCondition::ReceiveOverrun, now);
-        }
-    }
-
-    /// Takes at most `budget` frames from a queue, with the times of their arrival; drops frames of others. Returns the
-    /// number of frames.
-    #[cfg(feature = "queue")]
-    pub fn poll_queue(&mut self, queue: &mut FrameReceiver<'_>, budget: usize) -> usize {
-        self.poll_queue_with(queue, budget, |_| {})
-    }
-
-    /// Takes at most `budget` frames from a queue, with the times of their arrival, and hands frames of others to
-    /// `unrelated`. Returns the number of frames.
-    ///
-    /// Frames dropped by the queue since the last call are noted as [`lost`](super::Statistics::lost).
-    ///
-    /// # Examples
-    /// ```
-    /// use drivetrain::dji::{Bus, Config, M3508};
-    /// use drivetrain::frame::CanFrame;
-    /// use drivetrain::runner::{BusCondition, FrameQueue, Nb, Runner};
-    /// use drivetrain::time::{Instant, ManualClock};
-    /// # use drivetrain::sim::Simulation;
-    /// # let world = Simulation::new(1);
-    /// # let can = world.controller();
-    ///
-    /// let clock = ManualClock::new(Instant::from_micros(9));
-    /// let mut bus = Bus::new();
-    /// bus.attach(Config::<M3508>::new(1))?;
-    /// let mut runner = Runner::new(Nb(can), &clock, bus);
-    /// let mut queue = FrameQueue::<4>::new();
-    /// let (mut interrupt, mut received) = queue.split();
-    /// let frame = CanFrame::standard(0x201, [0; 8]).ok_or("not an 11-bit id")?;
-    /// for at in 1..=5 {
-    ///     interrupt.push(&frame, Instant::from_micros(at)); // there is room for three
-    /// }
-    /// assert_eq!(runner.poll_queue_with(&mut received, 16, |_| {}), 3);
-    /// assert_eq!(runner.statistics().lost, 2);
-    /// assert!(runner.has(BusCondition::ReceiveOverrun));
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    #[cfg(feature = "queue")]
-    pub fn poll_queue_with(
-        &mut self,
-        queue: &mut FrameReceiver<'_>,
-        budget: usize,
-        mut unrelated: impl FnMut(&CanFrame),
-    ) -> usize {
-        self.watch.receive_ran();
-        self.note_lost(queue.take_dropped());
-        let (mut tally, mut frames) = (Tally::default(), 0);
-        while frames < budget {
-            let Some((frame, arrived)) = queue.pop() else { break };
-            frames += 1;
-            if self.take(&frame, arrived, &mut tally) == Ingest::Unrelated {
-                unrelated(&frame);
-            }
-        }
-        self.enter(frames, &tally);
-        self.watch.standstill.receive(frames);
-        frames
-    }
-
-    /// Takes one frame received elsewhere, for example in an interrupt, with the time of its arrival.
-    pub fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
-        let mut tally = Tally::default();
-        let outcome = self.take(frame, now, &mut tally);
-        self.enter(1, &tally);
-        self.watch.standstill.receive(1);
-        outcome
-    }
-
-    #[inline(always)]
-    fn take(&mut self, frame: &CanFrame, now: Instant, tally: &mut Tally) -> Ingest {
-        if !frame.is_whole() {
-            self.meter.count_other(frame);
-            tally.others += 1;
-        }
-        let outcome = self.device.ingest(frame, now);
-        if outcome != Ingest::Taken {
-            tally.reject(outcome);
-        }
-        outcome
-    }
-
-    /// Counts the frames of one call.
-    #[expect(clippy::cast_possible_truncation, reason = "a budget of 2^32 frames takes a day")]
-    fn enter(&mut self, frames: usize, tally: &Tally) {
-        let frames = frames as u32;
-        self.meter.count_whole(frames.saturating_sub(tally.others));
-        let taken = frames.saturating_sub(tally.rejected);
-        let unrelated = tally.rejected.saturating_sub(tally.malformed);
-        let counted = &mut self.statistics;
-        counted.taken = counted.taken.saturating_add(taken);
-        if tally.rejected > 0 {
-            counted.unrelated = counted.unrelated.saturating_add(unrelated);
-            counted.malformed = counted.malformed.saturating_add(tally.malformed);
-        }
-        if taken > 0 {
-            self.watch.hear();
-        }
-    }
-
-    /// Counts received frames lost before this call, for example in a queue of the application. 0 changes nothing.
-    pub fn note_lost(&mut self, frames: u32) {
-        if frames > 0 {
-            self.statistics.lost = self.statistics.lost.saturating_add(frames);
-            let now = self.read_clock();
-            self.watch.edges.begin(BusCondition::ReceiveOverrun, now);
-        }
-    }
+/// The sending of one tick: frames of a device go to the driver, and frames that the driver gives back go to the device.
+pub(super) struct Sending<'r, P, D> {
+    pub(super) port: &'r mut P,
+    pub(super) device: &'r mut D,
+    pub(super) statistics: &'r mut Statistics,
+    pub(super) meter: &'r mut Meter,
+    pub(super) watch: &'r mut Watch,
+    /// A frame that failed as the first, and therefore goes last in the next tick.
+    pub(super) yields: &'r mut Option<u32>,
+    pub(super) turn: u32,
+    pub(super) now: Instant,
 }
 
-impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
+impl<P: Driver, D: Devices> Sending<'_, P, D> {
+    /// Calls back the frames offered in the tick before that did not leave; hands frames of others to `others`.
+    #[inline]
+    pub(super) fn call_back(self, others: &mut impl FnMut(&CanFrame)) {
+        let Self { port, device, statistics, meter, watch, now, .. } = self;
+        port.call_back(|frame| match frame {
+            Some(frame) if device.requeue(&frame) => {
+                increment(&mut statistics.evicted);
+                meter.discount(&frame);
+                watch.called_back(frame.header(), now);
+            }
+            frame => {
+                increment(&mut statistics.evicted_unrelated);
+                if let Some(frame) = frame {
+                    others(&frame);
+                }
+            }
+        });
+    }
+
+    /// The parts, for a call out of line: the parts of the usual case then stay in registers.
+    #[inline(always)]
+    const fn reborrow(&mut self) -> Sending<'_, P, D> {
+        let Self { port, device, statistics, meter, watch, yields, turn, now } = self;
+        Sending { port, device, statistics, meter, watch, yields, turn: *turn, now: *now }
+    }
+
     /// Offers the frames of one tick to the driver; hands evicted frames of others to `evicted`.
-    pub(super) fn send(&mut self, now: Instant, evicted: &mut impl FnMut(&CanFrame)) {
+    #[inline(always)]
+    pub(super) fn send(mut self, evicted: &mut impl FnMut(&CanFrame)) {
         if self.yields.is_some() {
-            return self.send_rest(0, None, now, evicted);
+            return self.reborrow().send_rest(0, None, evicted);
         }
         let mut other = CanFrame::EMPTY;
         for sent in 0..FRAMES_A_TICK {
             let Some(frame) = self.device.next_frame(self.turn) else { break };
             let outcome = self.port.try_send(&frame, &mut other);
             if outcome != Sent::Accepted {
-                return self.send_rest(sent, Some((frame, outcome, other)), now, evicted);
+                return self.reborrow().send_rest(sent, Some((frame, outcome, other)), evicted);
             }
-            self.note_accepted(&frame, now);
+            self.note_accepted(&frame);
         }
     }
 
@@ -315,10 +270,9 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     #[cold]
     #[inline(never)]
     fn send_rest(
-        &mut self,
+        mut self,
         sent: usize,
         mut offered: Option<(CanFrame, Sent, CanFrame)>,
-        now: Instant,
         evicted: &mut impl FnMut(&CanFrame),
     ) {
         let yields = self.yields.take();
@@ -344,42 +298,42 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
                 }
             };
             match outcome {
-                Sent::Accepted => self.note_accepted(&frame, now),
+                Sent::Accepted => self.note_accepted(&frame),
                 Sent::Evicted => {
                     self.count_sent(&frame);
                     if self.device.requeue(&other) {
                         increment(&mut self.statistics.evicted);
                         self.meter.discount(&other);
                         // Before the frame that took its place: both may have one id.
-                        self.watch.evicted(other.header(), now);
+                        self.watch.evicted(other.header(), self.now);
                     } else {
                         increment(&mut self.statistics.evicted_unrelated);
                         evicted(&other);
                     }
                     if other.header() != frame.header() {
-                        self.watch.accepted(frame.header(), now);
+                        self.watch.accepted(frame.header(), self.now);
                     }
                 }
                 Sent::EvictedForeign => {
                     self.count_sent(&frame);
                     increment(&mut self.statistics.evicted_unrelated);
-                    self.watch.accepted(frame.header(), now);
+                    self.watch.accepted(frame.header(), self.now);
                 }
                 Sent::Full => {
                     increment(&mut self.statistics.refused);
-                    self.watch.refused(frame.header(), now);
+                    self.watch.refused(frame.header(), self.now);
                     refused = Some(frame);
                     break;
                 }
                 Sent::Failed(kind) => {
                     self.statistics.send_errors.count(kind);
-                    let tries = self.watch.refused(frame.header(), now);
+                    let tries = self.watch.refused(frame.header(), self.now);
                     if tries >= PATIENCE && !is_first && goes_first.is_none() {
                         goes_first = Some(frame);
                     } else {
                         self.device.requeue(&frame);
                         if tries >= PATIENCE && is_first {
-                            self.yields = Some(frame.header());
+                            *self.yields = Some(frame.header());
                         }
                     }
                 }
@@ -392,9 +346,15 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         }
     }
 
-    fn note_accepted(&mut self, frame: &CanFrame, now: Instant) {
+    #[inline(always)]
+    fn note_accepted(&mut self, frame: &CanFrame) {
         self.count_sent(frame);
-        self.watch.accepted(frame.header(), now);
+        self.watch.accepted(frame.header(), self.now);
+    }
+
+    fn count_sent(&mut self, frame: &CanFrame) {
+        increment(&mut self.statistics.sent);
+        self.meter.count(frame);
     }
 }
 

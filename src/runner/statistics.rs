@@ -1,9 +1,8 @@
 //! Counters of a runner: frames, errors, and the load of the bus.
 
-use super::{Port, Runner};
 use crate::frame::CanFrame;
-use crate::motor::{BusLoad, Devices, Ingest};
-use crate::time::{Clock, Duration, Instant};
+use crate::motor::{BusLoad, Ingest};
+use crate::time::{Duration, Instant};
 use embedded_can::ErrorKind;
 
 /// Counters of a runner since its creation; every counter saturates.
@@ -94,6 +93,19 @@ impl Statistics {
         clock_reversals: 0,
     };
 
+    /// Counts the received frames of one call; returns the number of frames taken.
+    #[inline(always)]
+    pub(super) const fn enter(&mut self, frames: u32, tally: &Tally) -> u32 {
+        let taken = frames.saturating_sub(tally.rejected);
+        let unrelated = tally.rejected.saturating_sub(tally.malformed);
+        self.taken = self.taken.saturating_add(taken);
+        if tally.rejected > 0 {
+            self.unrelated = self.unrelated.saturating_add(unrelated);
+            self.malformed = self.malformed.saturating_add(tally.malformed);
+        }
+        taken
+    }
+
     /// Returns the counters, with the sums that have no counter of their own.
     pub(super) const fn with_sums(self) -> Self {
         let received = self.taken.saturating_add(self.unrelated).saturating_add(self.malformed);
@@ -149,49 +161,6 @@ impl Tally {
         if let Ingest::Malformed(_) = outcome {
             self.malformed += 1;
         }
-    }
-}
-
-impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
-    /// Returns the load of the bus in the last window of a second or a little more, by the frames sent and received here;
-    /// `None` in the first window.
-    ///
-    /// Frames are counted by their length. Compare the result with [`Bus::load`](crate::dji::Bus::load), calculated from the
-    /// rates of the motors: if the measured load is above, another node sends, or an ESC has another rate.
-    ///
-    /// # Limits
-    /// **Frames dropped by the filter of the controller are not counted**, nor are frames lost in an overrun, error frames
-    /// and repetitions. A sent frame counts when the driver takes it, and no longer when the driver gives it back.
-    ///
-    /// # Examples
-    /// Three M3508 at 1 kHz, whose three feedback frames of 8 bytes are the only traffic:
-    /// ```
-    /// use drivetrain::dji::{Bus, Config, M3508};
-    /// use drivetrain::runner::{Nb, Runner};
-    /// use drivetrain::sim::{MotorConfig, Simulation};
-    /// use drivetrain::time::Duration;
-    ///
-    /// let world = Simulation::new(1);
-    /// let mut bus = Bus::new();
-    /// for id in 1..=3 {
-    ///     world.attach(MotorConfig::m3508(id))?;
-    ///     bus.attach(Config::<M3508>::new(id))?;
-    /// }
-    /// let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
-    /// for _ in 0..2_100 {
-    ///     world.advance(Duration::from_millis(1));
-    ///     runner.poll(16);
-    ///     if let Some(tick) = runner.due() {
-    ///         runner.tick(tick);
-    ///     }
-    /// }
-    /// let load = runner.measured_load().ok_or("two seconds are over")?;
-    /// assert!((load.nominal() - 0.333).abs() < 0.03, "{load}"); // and a zero frame each 10 ms
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    #[must_use]
-    pub const fn measured_load(&self) -> Option<BusLoad> {
-        self.meter.last()
     }
 }
 

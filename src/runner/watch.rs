@@ -1,87 +1,14 @@
-//! Supervision of the loop: on time, with a clock that advances, with frames received and sent.
+//! The watch over the loop: on time, with a clock that advances, with frames received and sent.
 
 mod edge;
 
 pub use edge::BusCondition;
 
-use super::statistics::increment;
-use super::{Port, Runner};
-use crate::motor::Devices;
-use crate::time::{Clock, Duration, Instant, Tick};
+use crate::time::{Duration, Instant, Tick};
 use edge::{BusEdge, Edges, Unsent, WATCHED_FRAMES};
 
-impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
-    /// Reads the clock and returns the step that is due, if any.
-    ///
-    /// If the clock stands or goes back, a step with a `dt_s` of 0 is due: its update sends zeros and relaxes every motor
-    /// until armed again.
-    ///
-    /// A clock stands when too many readings in a row, by this method and by [`poll`](Self::poll), show no later time. The limit
-    /// is learned from the running clock: 100 times the most readings ever needed to show a later time, and at least 2 for each
-    /// microsecond of its resolution; from 1000 to 200 000, and 200 000 until the clock has advanced once. 1600 received frames
-    /// count as much as the limit.
-    ///
-    /// | loop | resolution of the clock | the step comes after |
-    /// |---|---|--:|
-    /// | polls 1 000 000 times a second | 1 µs | 1 ms |
-    /// | the same | 1 ms | 0.1 s |
-    /// | the same | 10 ms | 0.2 s |
-    /// | wakes up each 0.25 ms | 1 µs | 0.25 s |
-    /// | wakes up each ms | 1 µs | 1 s; 2 s if never early or late |
-    /// | the same | 1 ms | 2 s |
-    /// | the same | of a clock that has never moved | 200 s |
-    /// | wakes up for each frame of 4 motors at 1 kHz | 1 µs | 0.15 s |
-    ///
-    /// Slower loops set a limit of their own: [`with_standstill_after`](Self::with_standstill_after).
-    ///
-    /// A step that was not run stays due: further calls return the same step until [`tick`](Self::tick) or a sibling has run a
-    /// step. When the next step comes due before, the next step takes its place, with a `dt_s` that covers both, and the step
-    /// left out is an overrun; a step with a `dt_s` of 0 stays. So two runners can wait for each other:
-    /// `let (Some(one), Some(other)) = (one.due(), other.due()) else { continue };` loses none.
-    ///
-    /// Costs 125 instructions on a Cortex-M4F, when a step is due (`docs/figures.md`).
-    ///
-    /// Costs 132 instructions on a Cortex-M4F, when none is due (`docs/figures.md`).
-    pub fn due(&mut self) -> Option<Tick> {
-        let now = self.read_clock();
-        if self.watch.standstill.take() {
-            // Not after the last step that was run, so that the step does not count as advancing
-            // time.
-            let last = self.ticker.last();
-            let at = self.watch.ticked().map_or(last, |ticked| ticked.min(last));
-            self.waiting = Some(Tick::new(at, 0.0));
-            return self.waiting;
-        }
-        let before = self.ticker.overruns();
-        let next = self.ticker.due(now);
-        let mut is_late = self.ticker.overruns() != before;
-        if let Some(next) = next {
-            self.watch.standstill.restart(now);
-            is_late |= self.waiting.is_some();
-            self.waiting = Some(match self.waiting {
-                None => next,
-                Some(waiting) => {
-                    increment(&mut self.statistics.overruns);
-                    together(waiting, next)
-                }
-            });
-        }
-        if is_late {
-            self.watch.edges.begin(BusCondition::TickOverrun, now);
-        }
-        self.waiting
-    }
-
-    #[inline(never)]
-    pub(super) fn read_clock(&mut self) -> Instant {
-        let now = self.clock.now();
-        self.watch.read(now);
-        now
-    }
-}
-
 /// Merges a step that was not run with the next step: no elapsed time is lost, nor a clock that stood or went back.
-fn together(waiting: Tick, next: Tick) -> Tick {
+pub(super) fn together(waiting: Tick, next: Tick) -> Tick {
     if next.dt_s() <= 0.0 {
         next
     } else if waiting.dt_s() <= 0.0 {
@@ -329,7 +256,7 @@ mod tests {
     use crate::dji::{Bus, Config, M3508};
     use crate::frame::CanFrame;
     use crate::motor::Condition;
-    use crate::runner::Nb;
+    use crate::runner::{Nb, Runner};
     use crate::time::ManualClock;
     use embedded_can::ErrorKind;
 

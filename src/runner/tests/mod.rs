@@ -4,7 +4,7 @@ mod abort;
 
 use super::*;
 use crate::dji::{Bus, Config, Handle, M3508};
-use crate::motor::Ingest;
+use crate::motor::{ArmError, Ingest};
 use crate::time::{Instant, ManualClock};
 use embedded_can::{ErrorKind, Frame, StandardId};
 use std::collections::VecDeque;
