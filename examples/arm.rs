@@ -14,9 +14,9 @@ use drivetrain::damiao::{Model, Motor};
 use drivetrain::error::ConfigError;
 use drivetrain::geometry::Vec3;
 use drivetrain::manipulator::{ArmJoint, SerialArm};
-use drivetrain::motor::{Devices, Impedance, ImpedanceControl, Own, OwnMotor};
+use drivetrain::motor::{AngleDrive, Devices, Impedance, ImpedanceControl, Own};
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::sim::{DamiaoDrive, DriveShaft, Line, Simulation};
+use drivetrain::sim::{DamiaoDrive, DriveShaft, Line, Sender, Simulation};
 use drivetrain::time::Duration;
 use drivetrain::units::Angle;
 use output::console;
@@ -135,7 +135,9 @@ fn simulate() -> Result<Vec<Sample>, Box<dyn Error>> {
     for ms in 0..END {
         let mut answers = Vec::new();
         world.advance_with(Duration::from_millis(1), |record| {
-            answers.extend(drives.iter_mut().filter_map(|drive| drive.hear(&record.frame)));
+            if record.sender == Sender::Controller {
+                answers.extend(drives.iter_mut().filter_map(|drive| drive.hear(&record.frame)));
+            }
         });
         for answer in answers {
             world.inject(Line::Can1, answer).map_err(|_| "the bus is full")?;
@@ -156,8 +158,8 @@ fn simulate() -> Result<Vec<Sample>, Box<dyn Error>> {
         }
         let pose = [if ms < TURNED { base } else { BASE_DEG }, shoulder, elbow];
         let joints = runner.device_mut();
-        let measured = joints.each_ref().map(|joint| joint.motor().angle());
-        // An angle that is not known yet gives no torque.
+        let measured = joints.each_ref().map(|joint| joint.angle(()));
+        // An angle that is not known gives no torque: before the first feedback, and while the joint is not heard.
         let positions = measured.map(|angle| angle.map_or(f32::NAN, Angle::as_radians));
         let weights = model.holding_efforts(&positions).unwrap_or_default();
         let compensates = ms >= COMPENSATED;

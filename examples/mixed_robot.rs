@@ -18,8 +18,8 @@ use drivetrain::motor::{
 };
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{
-    ChassisConfig, DamiaoDrive, DriveShaft, Line, MotorConfig, MotorKey, Simulation, VescDrive,
-    VescMotor, Wheel,
+    ChassisConfig, DamiaoDrive, DriveShaft, Line, MotorConfig, MotorKey, Sender, Simulation,
+    VescDrive, VescMotor, Wheel,
 };
 use drivetrain::time::Duration;
 use drivetrain::units::{Angle, AngularVelocity};
@@ -126,7 +126,7 @@ impl Drives {
             answers.extend(self.shooter.report(9));
         }
         world.advance_with(Duration::from_millis(1), |record| {
-            if record.line == Line::Can2 {
+            if (record.line, record.sender) == (Line::Can2, Sender::Controller) {
                 answers.extend(self.pitch.hear(&record.frame));
                 answers.extend(self.shooter.hear(&record.frame));
             }

@@ -28,9 +28,10 @@ const TMAX: usize = 6;
 
 /// A Damiao drive with its shaft, for tests: takes frames, answers them, and moves.
 ///
-/// The drive is not a part of the [`Simulation`](crate::sim::Simulation): pass each frame of the bus to [`hear`](Self::hear), and put the
-/// answer on the bus. Enabling, errors, the four control modes, registers and the time-out are as in the manual. A frame to the id of
-/// another control mode is discarded without an answer. The shaft is an inertia with viscous friction.
+/// The drive is not a part of the [`Simulation`](crate::sim::Simulation): pass each frame of the
+/// [`Controller`](crate::sim::Sender::Controller) to [`hear`](Self::hear), and put the answer on the bus. Enabling, errors, the four
+/// control modes, registers and the time-out are as in the manual. A frame to the id of another control mode is discarded without an
+/// answer. The shaft is an inertia with viscous friction.
 ///
 /// # Examples
 /// ```

@@ -16,8 +16,8 @@ const VELOCITY: u32 = 2;
 
 /// An ODrive axis with its shaft, for tests: takes frames, answers remote ones, sends cyclic frames, and moves.
 ///
-/// The axis is not a part of the [`Simulation`](crate::sim::Simulation): pass each frame of the bus to [`hear`](Self::hear), and put the
-/// answer and the [cyclic frames](Self::next_frame) on the bus. States, modes, limits, errors and the watchdog are as in the firmware: if
+/// The axis is not a part of the [`Simulation`](crate::sim::Simulation): pass each frame of the
+/// [`Controller`](crate::sim::Sender::Controller) to [`hear`](Self::hear), and put the answer and the [cyclic frames](Self::next_frame) on the bus. States, modes, limits, errors and the watchdog are as in the firmware: if
 /// an axis in closed loop receives another request for closed loop, the axis drops the torque and begins anew. The endpoints of 0.6 have
 /// the numbers 1 to 4: control mode, input mode, watchdog time-out, watchdog enabled.
 ///

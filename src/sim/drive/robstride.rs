@@ -28,8 +28,8 @@ const VBUS: u16 = 0x701C;
 
 /// A RobStride drive with its shaft, for tests: takes frames, answers them, and moves.
 ///
-/// The drive is not a part of the [`Simulation`](crate::sim::Simulation): pass each frame of the bus to [`hear`](Self::hear), and put the
-/// answer on the bus. Run modes 0 to 3 and 5, parameters, faults and the time-out are as in the manual. The torque constant is 1 Nm/A. When
+/// The drive is not a part of the [`Simulation`](crate::sim::Simulation): pass each frame of the
+/// [`Controller`](crate::sim::Sender::Controller) to [`hear`](Self::hear), and put the answer on the bus. Run modes 0 to 3 and 5, parameters, faults and the time-out are as in the manual. The torque constant is 1 Nm/A. When
 /// enabled, the drive follows the targets already set. The reported position starts again at the other end of its range; a
 /// [CyberGear](Self::cybergear) clamps the position at the end. An operation frame names no host, so the drive answers to the host of the
 /// last frame with one.

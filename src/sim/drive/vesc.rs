@@ -36,8 +36,8 @@ pub struct VescMotor {
 
 /// A VESC with its shaft, for tests: takes frames, answers requests for its fault code, and moves.
 ///
-/// The drive is not a part of the [`Simulation`](crate::sim::Simulation): pass each frame of the bus to [`hear`](Self::hear), and put the
-/// answers and the status frames of [`report`](Self::report) on the bus. If commands stop, the drive brakes with its time-out current.
+/// The drive is not a part of the [`Simulation`](crate::sim::Simulation): pass each frame of the
+/// [`Controller`](crate::sim::Sender::Controller) to [`hear`](Self::hear), and put the answers and the status frames of [`report`](Self::report) on the bus. If commands stop, the drive brakes with its time-out current.
 /// After a fault, commands are ignored for half a second. The shaft is an inertia with viscous friction.
 ///
 /// # Examples
