@@ -47,6 +47,9 @@ impl Watch {
 
     pub(crate) fn with_config(self, config: &'static HealthConfig) -> Result<Self, &'static str> {
         config.validate()?;
+        if config.soft_limits.is_some() {
+            return Err("soft limits");
+        }
         Ok(Self { config, ..self })
     }
 

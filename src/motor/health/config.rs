@@ -121,7 +121,8 @@ impl HealthConfig {
     /// two turns from zero.
     ///
     /// Outside, the motor is driven inward only, also if the shaft starts there; at speed, already a little before. No effect while the
-    /// absolute position is unknown: for a geared motor, until the position is set.
+    /// absolute position is unknown: for a geared motor, until the position is set. For the motors of a [`Bus`](crate::dji::Bus); every
+    /// other motor refuses a configuration with soft limits.
     #[must_use]
     pub const fn with_soft_limits(self, lower: Angle, upper: Angle) -> Self {
         Self { soft_limits: Some((lower.as_radians(), upper.as_radians())), ..self }
