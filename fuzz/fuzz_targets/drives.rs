@@ -460,6 +460,10 @@ impl<M: OwnMotor + Copy + Debug, D: Drive> Bench<M, D> {
             let is_claimed = CanDevice::claims(&self.own)
                 .any(|claim| claim.role() == Role::Command && claim.covers(frame.id()));
             assert!(is_claimed || frame.is_remote_frame(), "{frame:?}");
+            if refused & 0x10 << turn != 0 {
+                assert!(Devices::put_back(&mut self.own, &frame), "{frame:?}");
+                assert_eq!(Devices::next_frame(&mut self.own, turn), Some(frame));
+            }
             if refused & 1 << turn != 0 {
                 assert!(Devices::requeue(&mut self.own, &frame), "{frame:?}");
                 self.owed = 1;

@@ -563,6 +563,12 @@ impl CanDevice for Watched {
         own
     }
 
+    fn put_back(&mut self, frame: &CanFrame) -> bool {
+        let own = self.bus.put_back(frame);
+        self.note_wire(frame, |_| Wire::Waits);
+        own
+    }
+
     fn superseded(&self) -> u32 {
         CanDevice::superseded(&self.bus)
     }

@@ -28,6 +28,10 @@ impl<B, const N: usize> CanDevice for Bus<B, N> {
         Self::requeue(self, frame)
     }
 
+    fn put_back(&mut self, frame: &CanFrame) -> bool {
+        self.outbox.put_back(frame.header())
+    }
+
     fn superseded(&self) -> u32 {
         self.outbox.superseded
     }

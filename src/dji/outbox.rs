@@ -330,6 +330,17 @@ impl Outbox {
             _ => false,
         }
     }
+
+    /// Marks a frame that found no place; the frame goes first, with its newest words.
+    pub(super) fn put_back(&mut self, header: u32) -> bool {
+        match CommandFrame::with_id(header) {
+            Some(frame) if self.ever_used & frame.bit() != 0 => {
+                self.waiting.0 = [self.waiting.0[0] | frame.bit(), frame.bit().wrapping_neg()];
+                true
+            }
+            _ => false,
+        }
+    }
 }
 
 #[cfg(test)]

@@ -21,6 +21,7 @@ use embedded_can::Frame;
 ///     fn update(&mut self, tick: Tick) {}
 ///     fn next_frame(&mut self) -> Option<CanFrame> { None }
 ///     fn requeue(&mut self, frame: &CanFrame) -> bool { false }
+///     fn put_back(&mut self, frame: &CanFrame) -> bool { false }
 ///     fn superseded(&self) -> u32 { 0 }
 ///     fn claims(&self) -> impl Iterator<Item = Claim> { core::iter::empty() }
 ///     fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName> { core::iter::empty() }
@@ -54,6 +55,10 @@ pub trait CanDevice {
     ///
     /// The frame is not offered again before the next update, and then with the newest values.
     fn requeue(&mut self, frame: &CanFrame) -> bool;
+
+    /// Takes back a frame of this update for which the driver had no place: [`next_frame`](Self::next_frame) returns the frame
+    /// again, with the newest values. `false` for every other frame, which nothing has changed then: [`requeue`](Self::requeue) it.
+    fn put_back(&mut self, frame: &CanFrame) -> bool;
 
     /// Returns the number of frames replaced by newer frames before sending, wrapping.
     fn superseded(&self) -> u32;
@@ -207,6 +212,19 @@ impl Visitor for Back<'_> {
         let sends = |claim: Claim| claim.role() == Role::Command && claim.id() == self.frame.id();
         let asks = !self.to_owner || device.claims().any(sends);
         self.taken = self.taken || (asks && device.requeue(self.frame));
+    }
+}
+
+/// Puts a frame back into the list of its device.
+pub(super) struct PutBack<'a> {
+    pub(super) frame: &'a CanFrame,
+    pub(super) taken: bool,
+}
+
+impl Visitor for PutBack<'_> {
+    #[inline]
+    fn visit(&mut self, device: &mut impl CanDevice) {
+        self.taken = self.taken || device.put_back(self.frame);
     }
 }
 

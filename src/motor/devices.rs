@@ -1,8 +1,8 @@
 //! One device or several, as seen by their caller.
 
 use super::device::{
-    Ask, Back, ClearStop, Disarm, Engage, Nth, Obstacles, Offer, Parts, Read, Rival, Search,
-    Standing, Stop, Superseded, Trip, Update, Visitor,
+    Ask, Back, ClearStop, Disarm, Engage, Nth, Obstacles, Offer, Parts, PutBack, Read, Rival,
+    Search, Standing, Stop, Superseded, Trip, Update, Visitor,
 };
 use super::{ArmError, Claim, Edge, Ingest, Missing};
 use crate::frame::CanFrame;
@@ -99,6 +99,14 @@ pub trait Devices {
         back.to_owner = false;
         self.visit(&mut back);
         back.taken
+    }
+
+    /// Takes back a frame of this update for which the driver had no place, and offers the frame again in this update, with the newest
+    /// values; `false` for a frame of an earlier update and for a frame of no device.
+    fn put_back(&mut self, frame: &CanFrame) -> bool {
+        let mut put_back = PutBack { frame, taken: false };
+        self.visit(&mut put_back);
+        put_back.taken
     }
 
     /// Returns the number of frames replaced by newer frames before sending, wrapping.

@@ -4,11 +4,13 @@
 //! driver ──try_receive──> poll ──> device.ingest(frame, now)      bounded; others' frames are handed back
 //! clock  ───────────────> due  ──> Tick                           1 kHz on a grid, overruns counted
 //!                         tick ──> device.update ──> next_frame ──try_send──> driver
-//!                                                     requeue <── refused, failed or evicted
+//!                                          put_back, requeue <── refused, failed or evicted
 //! ```
 //!
-//! Sending never loses a newest value: a frame refused, failed or evicted by the driver is offered again after the next
-//! update, first, with the values of that update. Frames pending in the controller cannot be called back through
+//! Sending never loses a newest value. A frame refused or evicted by the driver is offered again by each poll until the next update,
+//! so more frames than the controller has places leave one after the other; poll oftener than once a period then, and choose a
+//! [period](Runner::with_period) with time for all of them on the bus. A frame of an update before, or one that failed, is offered again
+//! after the next update, first, with the values of that update. Frames pending in the controller cannot be called back through
 //! `embedded-can`: up to one frame a mailbox with older values may still go out after a stop. A driver able to abort
 //! pending frames implements [`AbortPending`], and [`NbAbort`] then leaves no frame older than one period.
 //!
@@ -40,7 +42,7 @@ use crate::motor::{Devices, Ingest};
 use crate::time::{Clock, Duration, Instant, Tick, Ticker};
 use port::{Received, Sending};
 use statistics::{Meter, Tally, increment};
-use watch::{Watch, together};
+use watch::{Pending, Watch, together};
 
 /// Number of frames for one reading of the clock: frames in the driver arrived before the reading, and frames arriving
 /// meanwhile look older by the processing time of the others.
@@ -92,8 +94,7 @@ pub struct Runner<P, K, D> {
     stop: Option<&'static EmergencyStop>,
     watch: Watch,
     meter: Meter,
-    /// A frame that failed as the first, and therefore goes last in the next tick.
-    yields: Option<u32>,
+    pending: Pending,
 }
 
 impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
@@ -111,15 +112,8 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
             stop: None,
             watch: Watch::new(),
             meter: Meter::new(),
-            yields: None,
+            pending: Pending::NONE,
         }
-    }
-
-    /// Sets another period than 1 ms.
-    #[must_use]
-    pub fn with_period(mut self, period: Duration) -> Self {
-        self.ticker = Ticker::new(period);
-        self
     }
 
     /// Takes at most `budget` received frames from the driver; frames of others are dropped. Returns how many came.
@@ -163,6 +157,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         // Frames since the last reading.
         let waited = frames.checked_sub(1).map_or(0, |before| before % FRAMES_A_READING + 1);
         self.watch.standstill.receive(waited);
+        self.send_waiting();
         frames + foreign
     }
 
@@ -222,6 +217,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         }
         self.enter(frames, &tally);
         self.watch.standstill.receive(frames);
+        self.send_waiting();
         frames
     }
 
@@ -347,6 +343,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
 
     fn step(&mut self, tick: Tick, limit: impl FnOnce(&mut D), mut evicted: impl FnMut(&CanFrame)) {
         self.waiting = None;
+        self.pending.hand_over(&mut evicted);
         if self.stop.is_some_and(EmergencyStop::is_set) {
             self.device.emergency_stop();
         }
@@ -363,10 +360,17 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     }
 
     /// The parts that sending needs.
+    fn send_waiting(&mut self) {
+        if self.pending.is_due() {
+            let now = self.read_clock();
+            self.sending(now).send_later();
+        }
+    }
+
     #[inline(always)]
     const fn sending(&mut self, now: Instant) -> Sending<'_, P, D> {
-        let Self { port, device, statistics, meter, watch, yields, turn, .. } = self;
-        Sending { port, device, statistics, meter, watch, yields, turn: *turn, now }
+        let Self { port, device, statistics, meter, watch, pending, turn, .. } = self;
+        Sending { port, device, statistics, meter, watch, pending, turn: *turn, now }
     }
 
     /// Returns the device.

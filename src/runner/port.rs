@@ -2,7 +2,7 @@
 
 use super::Statistics;
 use super::statistics::{Meter, increment};
-use super::watch::Watch;
+use super::watch::{Pending, Watch};
 use crate::frame::CanFrame;
 use crate::motor::Devices;
 use crate::time::Instant;
@@ -211,8 +211,7 @@ pub(super) struct Sending<'r, P, D> {
     pub(super) statistics: &'r mut Statistics,
     pub(super) meter: &'r mut Meter,
     pub(super) watch: &'r mut Watch,
-    /// A frame that failed as the first, and therefore goes last in the next tick.
-    pub(super) yields: &'r mut Option<u32>,
+    pub(super) pending: &'r mut Pending,
     pub(super) turn: u32,
     pub(super) now: Instant,
 }
@@ -240,44 +239,60 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
     /// The parts, for a call out of line: the parts of the usual case then stay in registers.
     #[inline(always)]
     const fn reborrow(&mut self) -> Sending<'_, P, D> {
-        let Self { port, device, statistics, meter, watch, yields, turn, now } = self;
-        Sending { port, device, statistics, meter, watch, yields, turn: *turn, now: *now }
+        let Self { port, device, statistics, meter, watch, pending, turn, now } = self;
+        Sending { port, device, statistics, meter, watch, pending, turn: *turn, now: *now }
     }
 
     /// Offers the frames of one tick to the driver; hands evicted frames of others to `evicted`.
     #[inline(always)]
     pub(super) fn send(mut self, evicted: &mut impl FnMut(&CanFrame)) {
-        if self.yields.is_some() {
-            return self.reborrow().send_rest(0, None, evicted);
+        if self.pending.yields.is_some() {
+            return self.reborrow().send_rest(0, None, false, evicted);
         }
         let mut other = CanFrame::EMPTY;
         for sent in 0..FRAMES_A_TICK {
             let Some(frame) = self.device.next_frame(self.turn) else { break };
             let outcome = self.port.try_send(&frame, &mut other);
             if outcome != Sent::Accepted {
-                return self.reborrow().send_rest(sent, Some((frame, outcome, other)), evicted);
+                return self.reborrow().send_rest(
+                    sent,
+                    Some((frame, outcome, other)),
+                    false,
+                    evicted,
+                );
             }
             self.note_accepted(&frame);
         }
     }
 
+    /// Offers the frames of the tick before that found no place.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn send_later(mut self) {
+        let mut other = None;
+        self.pending.waits = false;
+        self.reborrow().send_rest(0, None, true, &mut |frame: &CanFrame| other = Some(*frame));
+        self.pending.evicted = other;
+    }
+
     /// Offers the frames after a frame not simply taken by the driver, and all frames of a tick in which a frame takes
     /// another turn.
     ///
-    /// A frame without a place goes first in the next tick. A frame that fails again and again takes another turn: the
-    /// last after the first, otherwise the first. So a driver with one failing call in each tick, always the first or
-    /// always the last, keeps no frame from the bus.
+    /// A frame without a place ends the sending, and is offered again by the next poll or, with new values, first in the next tick.
+    /// A frame that fails again and again takes another turn: the last after the first, otherwise the first. So a driver with one
+    /// failing call in each tick, always the first or always the last, keeps no frame from the bus.
     #[cold]
     #[inline(never)]
     fn send_rest(
         mut self,
         sent: usize,
         mut offered: Option<(CanFrame, Sent, CanFrame)>,
+        is_later: bool,
         evicted: &mut impl FnMut(&CanFrame),
     ) {
-        let yields = self.yields.take();
+        let yields = if is_later { None } else { self.pending.yields.take() };
         let (mut held, mut goes_first, mut refused) = (None, None, None);
-        let mut is_first = sent == 0;
+        let mut is_first = sent == 0 && !is_later;
         for _ in sent..FRAMES_A_TICK {
             let (frame, outcome, other) = match offered.take() {
                 Some(offered) => offered,
@@ -301,7 +316,10 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
                 Sent::Accepted => self.note_accepted(&frame),
                 Sent::Evicted => {
                     self.count_sent(&frame);
-                    if self.device.requeue(&other) {
+                    let is_older = other.header() == frame.header();
+                    let waits = !is_older && self.device.put_back(&other);
+                    let is_own = waits || self.device.requeue(&other);
+                    if is_own {
                         increment(&mut self.statistics.evicted);
                         self.meter.discount(&other);
                         // Before the frame that took its place: both may have one id.
@@ -310,8 +328,12 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
                         increment(&mut self.statistics.evicted_unrelated);
                         evicted(&other);
                     }
-                    if other.header() != frame.header() {
+                    if !is_older {
                         self.watch.accepted(frame.header(), self.now);
+                    }
+                    if waits || is_later && !is_own {
+                        self.pending.waits = true;
+                        break;
                     }
                 }
                 Sent::EvictedForeign => {
@@ -320,9 +342,14 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
                     self.watch.accepted(frame.header(), self.now);
                 }
                 Sent::Full => {
-                    increment(&mut self.statistics.refused);
-                    self.watch.refused(frame.header(), self.now);
-                    refused = Some(frame);
+                    if !is_later {
+                        increment(&mut self.statistics.refused);
+                        self.watch.refused(frame.header(), self.now);
+                    }
+                    self.pending.waits = true;
+                    if !self.device.put_back(&frame) {
+                        refused = Some(frame);
+                    }
                     break;
                 }
                 Sent::Failed(kind) => {
@@ -333,7 +360,7 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
                     } else {
                         self.device.requeue(&frame);
                         if tries >= PATIENCE && is_first {
-                            *self.yields = Some(frame.header());
+                            self.pending.yields = Some(frame.header());
                         }
                     }
                 }

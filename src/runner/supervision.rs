@@ -2,11 +2,18 @@
 
 use super::{BusCondition, Port, Runner, Statistics};
 use crate::motor::{ArmError, Ask, BusLoad, Devices};
-use crate::time::{Clock, ConditionEdge, Tick};
+use crate::time::{Clock, ConditionEdge, Duration, Tick, Ticker};
 use core::sync::atomic::{AtomicBool, Ordering};
 use embedded_can::ErrorKind;
 
 impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
+    /// Sets another period than 1 ms.
+    #[must_use]
+    pub fn with_period(mut self, period: Duration) -> Self {
+        self.ticker = Ticker::new(period);
+        self
+    }
+
     /// Sets the number of readings in a row without a later time after which the clock counts as standing, at least 1,
     /// instead of the limit learned by [`due`](Self::due).
     ///

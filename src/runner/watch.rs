@@ -5,6 +5,7 @@ mod edge;
 pub use edge::BusCondition;
 
 use crate::time::{Duration, Instant, Tick};
+pub(super) use edge::Pending;
 use edge::{BusEdge, Edges, Unsent, WATCHED_FRAMES};
 
 /// Merges a step that was not run with the next step: no elapsed time is lost, nor a clock that stood or went back.

@@ -26,6 +26,11 @@ impl CanDevice for Joints {
         Self::requeue(self, frame)
     }
 
+    /// Requests and writes have turns of their own.
+    fn put_back(&mut self, _frame: &CanFrame) -> bool {
+        false
+    }
+
     fn superseded(&self) -> u32 {
         self.counters.superseded
     }

@@ -81,6 +81,9 @@ impl CanDevice for Careless {
             _ => frame,
         }
     }
+    fn put_back(&mut self, frame: &CanFrame) -> bool {
+        CanDevice::put_back(&mut self.0, frame)
+    }
     fn requeue(&mut self, frame: &CanFrame) -> bool {
         if self.1 == Mistake::OffersAtOnce {
             self.2 = Some(*frame);
@@ -262,6 +265,9 @@ impl CanDevice for Slipping {
     }
     fn next_frame(&mut self) -> Option<CanFrame> {
         self.wheels.device().next_frame()
+    }
+    fn put_back(&mut self, frame: &CanFrame) -> bool {
+        CanDevice::put_back(self.wheels.device(), frame)
     }
     fn requeue(&mut self, frame: &CanFrame) -> bool {
         self.wheels.device().requeue(frame)

@@ -160,6 +160,10 @@ impl<M: OnPins> CanDevice for Wired<M> {
         let waits = std::mem::take(&mut self.waits);
         waits.then(|| CanFrame::new(id(COMMAND), &self.pulse.0.get().to_be_bytes())).flatten()
     }
+    fn put_back(&mut self, frame: &CanFrame) -> bool {
+        self.waits |= frame.id() == id(COMMAND).into();
+        self.waits
+    }
     fn requeue(&mut self, frame: &CanFrame) -> bool {
         frame.id() == id(COMMAND).into() && frame.is_data_frame()
     }

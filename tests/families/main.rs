@@ -6,6 +6,7 @@ mod drives;
 mod faults;
 mod load;
 mod motors;
+mod places;
 mod questions;
 mod rest;
 mod station;

@@ -343,6 +343,7 @@ pub fn family<D: CanDevice + 'static>() {
     (|device: &mut D, tick: Tick| device.update(tick)).call();
     (|device: &mut D| device.next_frame()).call();
     (|device: &mut D, frame: &CanFrame| device.requeue(frame)).call();
+    (|device: &mut D, frame: &CanFrame| device.put_back(frame)).call();
     (|device: &D| device.superseded()).call();
     (|device: &D| device.claims().count()).call();
     (|device: &D, now: Instant| device.missing(now).count()).call();
@@ -366,6 +367,7 @@ pub fn device<D: Devices + 'static>() {
     (|device: &mut D, tick: Tick| device.update(tick)).call();
     (|device: &mut D, turn: u32| device.next_frame(turn)).call();
     (|device: &mut D, frame: &CanFrame| device.requeue(frame)).call();
+    (|device: &mut D, frame: &CanFrame| device.put_back(frame)).call();
     (|device: &mut D| device.superseded()).call();
     (|device: &mut D| device.claims().count()).call();
     (|device: &mut D| device.next_edge()).call();

@@ -1,15 +1,12 @@
 //! The motor as a device of the runner.
 
-use super::{Impedance, Offered, Order, Own, OwnMotor, Target};
+use super::{INQUIRY, Impedance, Offered, Order, Own, OwnMotor, Target};
 use crate::frame::CanFrame;
 use crate::math::wrap_pi;
 use crate::motor::{CanDevice, Claim, Edge, Ingest, Link, MotorName, Role, WrongSetting};
-use crate::time::{Duration, Instant, Tick, TimeStep};
+use crate::time::{Instant, Tick, TimeStep};
 use crate::units::Angle;
 use embedded_can::Frame;
-
-/// The time between two questions for a setting.
-const INQUIRY: Duration = Duration::from_millis(10);
 
 impl<M: OwnMotor> CanDevice for Own<M> {
     #[inline]
@@ -73,6 +70,18 @@ impl<M: OwnMotor> CanDevice for Own<M> {
         // Rest that was not sent gives way to no other frame.
         self.offered.is_rest &= self.offered.frame != Some(*frame);
         is_own
+    }
+
+    fn put_back(&mut self, frame: &CanFrame) -> bool {
+        let taken = Some(*frame);
+        if self.has_posted && self.switching.is_none() && self.switched == taken {
+            self.switching = taken;
+        } else if !self.offered.waits && self.offered.frame == taken && self.last == taken {
+            self.offered.waits = true;
+        } else {
+            return false;
+        }
+        true
     }
 
     fn superseded(&self) -> u32 {
@@ -144,7 +153,6 @@ impl<M: OwnMotor> CanDevice for Own<M> {
     }
 }
 
-/// The update, step by step.
 impl<M: OwnMotor> Own<M> {
     /// Tells whether the drive is enabled, and no frame but a command is due: the case of almost each cycle of a driven motor.
     #[inline]
@@ -276,8 +284,7 @@ impl<M: OwnMotor> Own<M> {
     /// The drive did not follow before: its output opens from zero, and its angle starts from where the shaft is.
     fn reopen(&mut self) {
         self.guard.reopen();
-        self.start = None;
-        self.start_velocity = None;
+        (self.start, self.start_velocity) = (None, None);
     }
 
     /// Returns the command of this step, or rest. If rest would disable a drive on the way to be enabled, returns the frame that asks
@@ -310,16 +317,16 @@ impl<M: OwnMotor> Own<M> {
         self.motor.control(Order { target, share, step })
     }
 
-    /// Returns the target; an angle on its way from where the shaft was, as far as the output range is open.
+    /// Returns the target on its way from where the shaft was, as far as the output range is open.
     fn goal(&mut self, opened: f32) -> Target {
         let measured = self.motor.angle().filter(|angle| angle.is_finite());
         match (self.target, measured) {
-            (Target::Angle(target), Some(measured)) if opened < 1.0 => {
+            (Target::Angle(target), Some(measured)) => {
                 let start = *self.start.get_or_insert(measured);
                 let way = wrap_pi((target - start).as_radians());
                 Target::Angle(start + Angle::from_radians(way * opened))
             }
-            (Target::Velocity(target), _) if opened < 1.0 => {
+            (Target::Velocity(target), _) => {
                 let start = *self.start_velocity.get_or_insert_with(|| self.motor.velocity());
                 if start.is_finite() {
                     Target::Velocity(start + (target - start) * opened)
@@ -327,7 +334,7 @@ impl<M: OwnMotor> Own<M> {
                     self.target
                 }
             }
-            (Target::Impedance(target), Some(measured)) if opened < 1.0 => {
+            (Target::Impedance(target), Some(measured)) => {
                 let start = *self.start.get_or_insert(measured);
                 let way = (target.angle - start).as_radians();
                 let angle = start + Angle::from_radians(way * opened);
@@ -338,8 +345,7 @@ impl<M: OwnMotor> Own<M> {
     }
 
     fn relax(&mut self) {
-        self.start = None;
-        self.start_velocity = None;
+        (self.start, self.start_velocity) = (None, None);
         if !self.is_resting {
             self.motor.reset();
             self.is_resting = true;

@@ -37,6 +37,8 @@ use route::Route;
 
 /// The most frames a second for the power of a drive, each beside a command or rest.
 const POWER_HZ: u32 = 100;
+/// The time between two questions for a setting.
+const INQUIRY: Duration = Duration::from_millis(10);
 
 /// A motor of your own as a device of the runner, beside all others.
 ///
@@ -179,7 +181,7 @@ impl<M: OwnMotor> Own<M> {
     /// Sets the checks of health and their reactions, as far as the motor's [`vitals`](OwnMotor::vitals) tell.
     ///
     /// # Errors
-    /// Names the parameter without a sensible value.
+    /// Names the parameter without a sensible value, and `soft limits`: keep the targets within the limits of the joint.
     pub fn with_health(self, config: &'static HealthConfig) -> Result<Self, &'static str> {
         let watch = self.watch.with_config(config)?;
         Ok(Self { watch, ..self })

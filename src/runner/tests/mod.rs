@@ -1,6 +1,7 @@
 //! The runner against a scripted driver: any answer at any time.
 
 mod abort;
+mod places;
 
 use super::*;
 use crate::dji::{Bus, Config, Handle, M3508};

@@ -273,12 +273,20 @@ fn requeue<S: Subject>(mut run: Run<S>) -> Outcome {
     let Output { last: Some(frame), .. } = run.step()? else {
         return run.expect(false, Rule::ArmedDrives);
     };
+    // Without a place in the controller, the frame comes again in this update.
+    let waits = run.subject.device().put_back(&frame);
+    let again = run.drain()?;
+    let expected = if waits { (1, Some(frame)) } else { (0, None) };
+    run.expect((again.frames, again.last) == expected, Rule::RequeuedComesAgain)?;
     let taken = run.subject.device().requeue(&frame);
     let waiting = run.drain()?.frames;
     run.expect(taken && waiting == 0, Rule::RequeuedComesAgain)?;
     // The newest value is to relax: the old value must not come back.
+    run.subject.device().put_back(&frame);
     run.subject.device().disarm();
-    run.drain()?;
+    run.subject.device().put_back(&frame);
+    let output = run.drain()?;
+    run.expect(output.driving == 0, Rule::RequeuedComesAgain)?;
     run.subject.device().requeue(&frame);
     let output = run.step()?;
     run.expect(output.frames > 0 && output.driving == 0, Rule::RequeuedComesAgain)?;

@@ -1,0 +1,60 @@
+//! Frames that find no place in the controller.
+
+use super::*;
+use std::vec;
+
+/// A tick in which only the first of both frames finds a place.
+fn tick_with_one_place(runner: &mut TestRunner<'_>, clock: &ManualClock) {
+    clock.advance(Duration::from_millis(1));
+    hear(runner, clock);
+    runner.port_mut().0.transmit.extend([Ok(None), Err(nb::Error::WouldBlock)]);
+    runner.tick(Tick::new(clock.now(), 0.001));
+    assert_eq!(offered(runner).len(), 2);
+}
+
+#[test]
+fn a_frame_without_a_place_is_offered_by_each_poll_until_sent() {
+    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let (mut runner, wheels) = driving(&clock);
+    set(&mut runner, wheels, 2);
+    tick_with_one_place(&mut runner, &clock);
+    runner.port_mut().0.transmit.push_back(Err(nb::Error::WouldBlock));
+    for expected in [&[(0x1FF, 2)][..], &[(0x1FF, 2)], &[]] {
+        clock.advance(Duration::from_micros(100));
+        assert_eq!(runner.poll(8), 0);
+        assert_eq!(offered(&mut runner), expected);
+    }
+    let statistics = runner.statistics();
+    assert_eq!((statistics.refused, statistics.superseded), (1, 0), "a poll is no new refusal");
+}
+
+#[test]
+fn a_frame_that_waits_is_at_rest_after_a_stop() {
+    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let (mut runner, wheels) = driving(&clock);
+    set(&mut runner, wheels, 2);
+    tick_with_one_place(&mut runner, &clock);
+    runner.device_mut().emergency_stop();
+    runner.poll(8);
+    let mut sent = offered(&mut runner);
+    sent.sort_unstable();
+    assert_eq!(sent, [(0x1FF, 0), (0x200, 0)]);
+}
+
+#[test]
+fn a_frame_of_others_evicted_by_a_poll_is_handed_back_by_the_next_tick() {
+    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let (mut runner, wheels) = driving(&clock);
+    let foreign = frame(0x7FF, [9; 8]);
+    set(&mut runner, wheels, 2);
+    tick_with_one_place(&mut runner, &clock);
+    runner.port_mut().0.transmit.push_back(Ok(Some(foreign)));
+    runner.poll(8);
+    assert_eq!(offered(&mut runner), [(0x1FF, 2)]);
+    runner.poll(8);
+    assert_eq!(offered(&mut runner), [], "one at a time is kept");
+    let mut handed_back = Vec::new();
+    clock.advance(Duration::from_millis(1));
+    runner.tick_with(Tick::new(clock.now(), 0.001), |frame| handed_back.push(*frame));
+    assert_eq!((handed_back, runner.statistics().evicted_unrelated), (vec![foreign], 1));
+}

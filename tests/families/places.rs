@@ -1,0 +1,100 @@
+//! More drives behind one controller than the controller has places for frames: three, as bxCAN has.
+
+use drivetrain::damiao::{Mode, Model, Motor};
+use drivetrain::frame::CanFrame;
+use drivetrain::motor::{Devices, Own, VelocityDrive};
+use drivetrain::runner::{Nb, Runner};
+use drivetrain::sim::{Controller, DamiaoDrive, DriveShaft, Line, Sender, Simulation};
+use drivetrain::time::Duration;
+use drivetrain::units::AngularVelocity;
+use embedded_can::{Frame, Id, StandardId};
+
+/// The driver of the simulator, which evicts the frame of the lowest priority; or refuses the fourth frame until it was polled.
+struct Driver<'w> {
+    controller: Controller<'w>,
+    only_refuses: bool,
+    taken: u8,
+}
+
+impl<'w> embedded_can::nb::Can for Driver<'w> {
+    type Frame = CanFrame;
+    type Error = <Controller<'w> as embedded_can::nb::Can>::Error;
+
+    fn transmit(&mut self, frame: &CanFrame) -> nb::Result<Option<CanFrame>, Self::Error> {
+        if self.only_refuses && self.taken == 3 {
+            return Err(nb::Error::WouldBlock);
+        }
+        self.taken += 1;
+        self.controller.transmit(frame)
+    }
+
+    fn receive(&mut self) -> nb::Result<CanFrame, Self::Error> {
+        let received = self.controller.receive();
+        self.taken = if received.is_err() { 0 } else { self.taken };
+        received
+    }
+}
+
+/// Drives `N` joints for a second, polled every `poll_us`. Returns the fewest commands in a second that reached a drive.
+fn fewest_commands<const N: usize>(only_refuses: bool, period_us: u32, poll_us: u32) -> usize {
+    let (world, model) = (Simulation::new(1), Model::J4310);
+    let ranges = [model.pmax_rad(), model.vmax_rad_per_s(), model.tmax_nm()];
+    let mode = || Mode::velocity(AngularVelocity::from_rpm(100.0));
+    let joints: [_; N] =
+        core::array::from_fn(|index| Own::new(Motor::new(model, index as u8 + 1, mode()).unwrap()));
+    let mut drives: [_; N] = core::array::from_fn(|index| {
+        let drive = DamiaoDrive::new(index as u8 + 1, 0x11 + index as u16, ranges);
+        drive.with_register(10, 3.0).with_shaft(DriveShaft::new(0.02, 0.02))
+    });
+    let period = Duration::from_micros(period_us.into());
+    let driver = Driver { controller: world.controller(), only_refuses, taken: 0 };
+    let mut runner = Runner::new(Nb(driver), world.clock(), joints).with_period(period);
+    let mut commands = [0; N];
+    for step in 0..3_000_000 / poll_us {
+        let mut answers = Vec::new();
+        world.advance_with(Duration::from_micros(poll_us.into()), |record| {
+            if record.sender != Sender::Controller {
+                return;
+            }
+            for (index, drive) in drives.iter_mut().enumerate() {
+                let is_command = record.frame.id() == id(0x201 + index as u16);
+                commands[index] += usize::from(is_command && step * poll_us >= 2_000_000);
+                answers.extend(drive.hear(&record.frame));
+            }
+        });
+        for answer in answers {
+            _ = world.inject(Line::Can1, answer);
+        }
+        drives.iter_mut().for_each(|drive| drive.step(poll_us as f32 * 1e-6));
+        runner.poll(16);
+        if let Some(tick) = runner.due() {
+            if tick.now().as_micros() / 1_000 >= 500 && !runner.is_armed() {
+                runner.arm(tick).unwrap();
+            }
+            for joint in runner.device_mut() {
+                _ = joint.set_velocity((), AngularVelocity::from_rpm(30.0));
+            }
+            runner.tick(tick);
+        }
+        assert_eq!(runner.device_mut().next_edge(), None);
+        assert_eq!(runner.next_edge(), None);
+    }
+    for drive in &drives {
+        assert!((drive.shaft().velocity_rad_per_s() - 3.14).abs() < 0.1);
+    }
+    commands.into_iter().min().unwrap()
+}
+
+fn id(raw: u16) -> Id {
+    StandardId::new(raw).unwrap().into()
+}
+
+#[test]
+fn four_and_six_drives_at_half_load_share_a_controller_with_three_places() {
+    for poll_us in [100, 1_000] {
+        assert_eq!(fewest_commands::<4>(false, 2_000, poll_us), 500);
+        assert_eq!(fewest_commands::<6>(false, 4_000, poll_us), 250);
+        assert_eq!(fewest_commands::<5>(true, 2_000, poll_us), 500);
+        assert_eq!(fewest_commands::<6>(true, 4_000, poll_us), 250);
+    }
+}
