@@ -7,9 +7,9 @@
 //!                                          put_back, requeue <── refused, failed or evicted
 //! ```
 //!
-//! Sending never loses a newest value. A frame refused or evicted by the driver is offered again by each poll until the next update,
-//! so more frames than the controller has places leave one after the other; poll oftener than once a period then, and choose a
-//! [period](Runner::with_period) with time for all of them on the bus. A frame of an update before, or one that failed, is offered again
+//! Sending never loses a newest value. Each poll offers frames again that the driver refused or evicted since the update, so the places
+//! of a controller limit no number of frames; with more frames than places, poll oftener than once a period, and choose a
+//! [period](Runner::with_period) in which the bus carries all frames. A failed frame, and a frame of an earlier update, are offered again
 //! after the next update, first, with the values of that update. Frames pending in the controller cannot be called back through
 //! `embedded-can`: up to one frame a mailbox with older values may still go out after a stop. A driver able to abort
 //! pending frames implements [`AbortPending`], and [`NbAbort`] then leaves no frame older than one period.
