@@ -435,6 +435,7 @@ impl<M: OwnMotor + Copy + Debug, D: Drive> Bench<M, D> {
     /// Runs an update. The driver gives the frames of which `refused` has a bit back.
     fn update(&mut self, dt_s: f32, refused: u8) {
         Devices::update(&mut self.own, Tick::new(self.now, dt_s));
+        self.owed = self.owed.saturating_sub(1);
         self.send(refused);
         self.judge();
     }
@@ -450,7 +451,6 @@ impl<M: OwnMotor + Copy + Debug, D: Drive> Bench<M, D> {
     }
 
     fn send(&mut self, refused: u8) {
-        self.owed = self.owed.saturating_sub(1);
         if self.drive.sends_back() {
             self.owed = self.owed.max(1);
         }

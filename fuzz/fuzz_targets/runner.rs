@@ -26,7 +26,9 @@ struct Scripted {
     received: Vec<Result<CanFrame, ErrorKind>>,
     waiting: Vec<CanFrame>,
     asked: u32,
+    /// But for the frames that a poll offers in vain, which are not counted.
     offered: u32,
+    is_polled: bool,
     accepted: u32,
     full: u32,
     failed: u32,
@@ -68,7 +70,10 @@ impl embedded_can::nb::Can for Scripted {
                 Ok(CanFrame::standard(0x600 + u16::from(answer), [answer; 8]))
             }
             170..=209 => {
-                self.full += 1;
+                (self.offered, self.full) = match self.is_polled {
+                    true => (self.offered - 1, self.full),
+                    false => (self.offered, self.full + 1),
+                };
                 Err(nb::Error::WouldBlock)
             }
             answer => {
@@ -175,9 +180,11 @@ fuzz_target!(|data: &[u8]| {
             64..=89 => {
                 let budget = usize::from(input.byte() % 20);
                 let asked = runner.port_mut().0.asked;
+                runner.port_mut().0.is_polled = true;
                 let came = runner.poll(budget);
+                runner.port_mut().0.is_polled = false;
                 let asked = runner.port_mut().0.asked - asked;
-                known.show(clock.now().as_micros(), asked.into());
+                known.show(clock.now().as_micros(), 1 + u64::from(asked));
                 known.hear(asked.into());
                 assert!(asked as usize <= budget && came <= budget, "I1");
             }

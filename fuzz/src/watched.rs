@@ -564,7 +564,8 @@ impl CanDevice for Watched {
     }
 
     fn put_back(&mut self, frame: &CanFrame) -> bool {
-        let own = self.bus.put_back(frame);
+        let own = CanDevice::put_back(&mut self.bus, frame);
+        self.given_back += u32::from(own);
         self.note_wire(frame, |_| Wire::Waits);
         own
     }

@@ -331,11 +331,14 @@ impl Outbox {
         }
     }
 
-    /// Marks a frame that found no place; the frame goes first, with its newest words.
+    /// Marks a frame that found no place; the frame goes first, with its newest words. An older one than the frame that waits is
+    /// superseded.
     pub(super) fn put_back(&mut self, header: u32) -> bool {
         match CommandFrame::with_id(header) {
             Some(frame) if self.ever_used & frame.bit() != 0 => {
-                self.waiting.0 = [self.waiting.0[0] | frame.bit(), frame.bit().wrapping_neg()];
+                let [dirty, _] = self.waiting.0;
+                self.superseded = self.superseded.wrapping_add(ones(dirty & frame.bit()));
+                self.waiting.0 = [dirty | frame.bit(), frame.bit().wrapping_neg()];
                 true
             }
             _ => false,

@@ -50,7 +50,7 @@ const FRAMES_A_READING: usize = 16;
 
 /// Moves frames between a driver and a device, at the pace of a clock.
 ///
-/// Takes 676 bytes on a Cortex-M4F, without driver, clock and device (`docs/figures.md`).
+/// Takes 700 bytes on a Cortex-M4F, without driver, clock and device (`docs/figures.md`).
 ///
 /// # Examples
 /// ```
@@ -118,7 +118,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
 
     /// Takes at most `budget` received frames from the driver; frames of others are dropped. Returns how many came.
     ///
-    /// Costs 535 instructions on a Cortex-M4F, for 8 frames of motors (`docs/figures.md`).
+    /// Costs 560 instructions on a Cortex-M4F, for 8 frames of motors (`docs/figures.md`).
     pub fn poll(&mut self, budget: usize) -> usize {
         self.poll_with(budget, |_| {})
     }
@@ -323,7 +323,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
 
     /// Runs one step: update, then send. Drops frames of others that the driver evicts.
     ///
-    /// Costs 643 instructions on a Cortex-M4F, with 8 speed loops (`docs/figures.md`).
+    /// Costs 648 instructions on a Cortex-M4F, with 8 speed loops (`docs/figures.md`).
     pub fn tick(&mut self, tick: Tick) {
         self.tick_with(tick, |_| {});
     }
@@ -361,7 +361,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
 
     /// The parts that sending needs.
     fn send_waiting(&mut self) {
-        if self.pending.is_due() {
+        if self.pending.waits {
             let now = self.read_clock();
             self.sending(now).send_later();
         }

@@ -288,7 +288,7 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
         sent: usize,
         mut offered: Option<(CanFrame, Sent, CanFrame)>,
         is_later: bool,
-        evicted: &mut impl FnMut(&CanFrame),
+        evicted: &mut dyn FnMut(&CanFrame),
     ) {
         let yields = if is_later { None } else { self.pending.yields.take() };
         let (mut held, mut goes_first, mut refused) = (None, None, None);
@@ -331,8 +331,8 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
                     if !is_older {
                         self.watch.accepted(frame.header(), self.now);
                     }
+                    self.pending.waits |= waits;
                     if waits || is_later && !is_own {
-                        self.pending.waits = true;
                         break;
                     }
                 }

@@ -23,11 +23,11 @@ pub struct Statistics {
     pub malformed: u32,
     /// Errors of the driver when asked for a frame.
     pub receive_errors: ErrorCounts,
-    /// Frames offered to the driver.
+    /// Frames offered to the driver, but for those that a poll offers again in vain.
     pub offered: u32,
     /// Frames taken by the driver.
     pub sent: u32,
-    /// Frames without a place in the driver. Kept, and offered again with newer values.
+    /// Frames without a place in the driver in a tick. Kept, and offered again.
     pub refused: u32,
     /// Errors of the driver when offered a frame. The frame is kept as well.
     pub send_errors: ErrorCounts,

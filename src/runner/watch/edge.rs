@@ -200,18 +200,12 @@ pub(in crate::runner) struct Pending {
     pub(in crate::runner) yields: Option<u32>,
     /// Frames that found no place wait in the device.
     pub(in crate::runner) waits: bool,
-    /// A frame of others, evicted by a frame that waited.
+    /// A frame of others, evicted by a frame that waited. One at a time: none is offered until the next tick.
     pub(in crate::runner) evicted: Option<CanFrame>,
 }
 
 impl Pending {
     pub(in crate::runner) const NONE: Self = Self { yields: None, waits: false, evicted: None };
-
-    /// Tells whether a frame waits. One evicted frame of others at a time is kept until the next tick.
-    #[inline]
-    pub(in crate::runner) const fn is_due(&self) -> bool {
-        self.waits && self.evicted.is_none()
-    }
 
     /// Begins a tick, whose update replaces the frames that wait.
     #[inline]
