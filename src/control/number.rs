@@ -27,6 +27,18 @@ pub(super) const fn finite(value: f32) -> f32 {
     }
 }
 
+/// Returns the effort against dry friction: `gain` in the direction of `motion`, and zero at rest.
+#[inline]
+pub(super) const fn friction(gain: f32, motion: f32) -> f32 {
+    if motion > 0.0 {
+        gain
+    } else if motion < 0.0 {
+        -gain
+    } else {
+        0.0
+    }
+}
+
 /// A sum without loss, of any size: a plain sum in `f32` of steps of 0.5 ms stands still at 16384 s. A part beyond `f32` is cut
 /// off and lost.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -136,7 +136,7 @@ impl Slot {
         full_limit: 0,
         ambiguous_gaps: 0,
         speed: NO_LOOP,
-        position: *NO_LOOP.core(),
+        position: NO_LOOP.core,
         generation: 0,
         place: Place::Nowhere,
         homing: Homing::Relative,
@@ -168,7 +168,7 @@ impl Slot {
     /// Tells a loop from [`NO_LOOP`], the only one without limits.
     #[inline]
     const fn has_speed_loop(&self) -> bool {
-        self.speed.is_limited()
+        self.speed.core.is_limited()
     }
 
     #[inline]
@@ -321,7 +321,7 @@ impl Slot {
             Duty::Velocity => self.goal.rad_per_s(),
             Duty::Position => {
                 let way = self.shaft.way_to(self.goal.turns(), self.goal.phase());
-                match self.position.plain((way, velocity), way, step) {
+                match self.position.plain(way, velocity, step) {
                     Ok(goal) => goal,
                     Err(_) => return self.update_carefully(dt_s, sent),
                 }
@@ -330,7 +330,7 @@ impl Slot {
             // Out of line too: inline, every update of every motor would load a zero for these.
             Duty::Rest | Duty::First | Duty::Other => return self.update_carefully(dt_s, sent),
         };
-        match self.speed.step_plain(goal, velocity, step) {
+        match self.speed.plain(goal, velocity, step) {
             Ok(output) => free_to_raw(output, self.raw_per_unit),
             Err(_) => self.follow_velocity(goal, velocity, dt_s),
         }

@@ -69,7 +69,7 @@ impl SpeedFilters {
     fn around(&mut self, pid: &mut Pid, setpoint: f32, speed: f32, step: &TimeStep) -> f32 {
         let wanted = pid.step(setpoint, self.feedback.pass(speed, step), step);
         self.value = match &mut self.output.0 {
-            Some(filter) => pid.within_output_range(filter.pass(wanted, step)),
+            Some(filter) => pid.core.within_output_range(filter.pass(wanted, step)),
             None => wanted,
         };
         self.value
@@ -143,7 +143,7 @@ impl SpeedActuator {
     /// Costs 80 instructions on a Cortex-M4F, without filters (`docs/figures.md`).
     pub fn step(&mut self, setpoint: f32, speed: f32, step: &TimeStep) -> f32 {
         if step.is_hold() || !setpoint.is_finite() || !speed.is_finite() {
-            self.pid.refuse(!step.is_hold());
+            self.pid.step(setpoint, speed, step); // refuses and counts
             self.filters.miss(step);
             return self.output();
         }

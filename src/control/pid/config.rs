@@ -2,27 +2,14 @@ use crate::error::{
     ConfigError, check, gains, not_negative, off_or_positive, ordered, output_ends, positive,
 };
 
-const ASYMMETRIC: u16 = 1;
-const INTEGRAL_WEIGHT: u16 = 1 << 1;
-const DEAD_BAND: u16 = 1 << 2;
-pub(super) const FEED_FORWARD: u16 = 1 << 3;
-pub(super) const SLEW_LIMIT: u16 = 1 << 4;
-pub(super) const PERIOD: u16 = 1 << 5;
-pub(super) const DERIVATIVE_FILTER: u16 = 1 << 6;
-pub(super) const DERIVATIVE_ON_ERROR: u16 = 1 << 7;
-pub(super) const TRACKING: u16 = 1 << 8;
-pub(super) const BACK_CALCULATION: u16 = 1 << 9;
-/// The options outside of the plain step.
-pub(super) const NOT_PLAIN: u16 = (1 << 10) - 1;
-pub(super) const INCREMENTAL: u16 = 1 << 10;
+/// An option outside of the plain step is on.
+pub(super) const NOT_PLAIN: u16 = 1;
+pub(super) const DERIVATIVE_ON_ERROR: u16 = 1 << 1;
+pub(super) const INCREMENTAL: u16 = 1 << 2;
 /// Set by a refused sample until the next good step: the travel of the measurement in that time is unknown.
-pub(super) const REST_DERIVATIVE: u16 = 1 << 11;
+pub(super) const REST_DERIVATIVE: u16 = 1 << 3;
 /// Set by `reset_to` until the next step.
-pub(super) const TRACK_OUTPUT: u16 = 1 << 12;
-/// The step has a given error and rate.
-pub(super) const GIVEN: u16 = 1 << 13;
-/// The options outside of such a step.
-pub(super) const OF_SETPOINT: u16 = FEED_FORWARD | PERIOD | DERIVATIVE_ON_ERROR | TRACKING;
+pub(super) const TRACK_OUTPUT: u16 = 1 << 4;
 
 /// The numbers of a [`PidConfig`] stored by a controller as they are.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -130,16 +117,14 @@ impl PidConfig {
     }
 
     /// Keeps the output in `lower..=upper`, `lower` below `upper`; otherwise as [`with_output_limit`](Self::with_output_limit).
-    pub const fn with_output_range(mut self, lower: f32, upper: f32) -> Self {
-        self.parameters.output_lower = lower;
-        self.parameters.output_upper = upper;
-        self
+    pub const fn with_output_range(self, lower: f32, upper: f32) -> Self {
+        let ends = Parameters { output_lower: lower, output_upper: upper, ..self.parameters };
+        Self { parameters: ends, ..self }
     }
 
     /// Keeps the integral term (in units of the output) in ±`limit`, more than zero. Off by default.
-    pub const fn with_integral_limit(mut self, limit: f32) -> Self {
-        self.integral_limit = limit;
-        self
+    pub const fn with_integral_limit(self, limit: f32) -> Self {
+        Self { integral_limit: limit, ..self }
     }
 
     /// Lets the integral rest while the error is beyond ±`threshold`, more than zero. Off by default: the integral always works.
@@ -163,15 +148,13 @@ impl PidConfig {
 
     /// Uses back-calculation instead of conditional integration: the part of the output beyond the limits drains the
     /// integral with the time constant `time_s`, more than zero.
-    pub const fn with_back_calculation(mut self, time_s: f32) -> Self {
-        self.parameters.drain_time_s = not_off(time_s);
-        self
+    pub const fn with_back_calculation(self, time_s: f32) -> Self {
+        Self { parameters: Parameters { drain_time_s: not_off(time_s), ..self.parameters }, ..self }
     }
 
     /// Lets the integral grow while the output is at its limit, as far as its own limit.
-    pub const fn without_anti_windup(mut self) -> Self {
-        self.parameters.drain_time_s = Self::OFF;
-        self
+    pub const fn without_anti_windup(self) -> Self {
+        Self { parameters: Parameters { drain_time_s: Self::OFF, ..self.parameters }, ..self }
     }
 
     /// Counts an error smaller than `width` as zero; an error of exactly `width` counts in full. Zero or more; zero, the default,
@@ -179,9 +162,8 @@ impl PidConfig {
     ///
     /// Inside the band P is zero and the integral moves towards zero only: the integral does not grow, and a wound-up
     /// integral is not frozen either.
-    pub const fn with_dead_band(mut self, width: f32) -> Self {
-        self.parameters.dead_band = width;
-        self
+    pub const fn with_dead_band(self, width: f32) -> Self {
+        Self { parameters: Parameters { dead_band: width, ..self.parameters }, ..self }
     }
 
     /// Adds `static_gain * sign(setpoint) + velocity_gain * setpoint` to the output. Zero or more; zero by default.
@@ -189,10 +171,8 @@ impl PidConfig {
     /// For speed loops: the effort to overcome dry friction (in units of the output), and the effort for a unit of speed. The
     /// setpoint is taken as `measurement + e`: on a circle, the setpoint next to the measurement, in any turn. A setpoint
     /// removed from the error by rounding counts as zero. A step with a given error has no feed-forward.
-    pub const fn with_feed_forward(mut self, static_gain: f32, velocity_gain: f32) -> Self {
-        self.static_gain = static_gain;
-        self.velocity_gain = velocity_gain;
-        self
+    pub const fn with_feed_forward(self, static_gain: f32, velocity_gain: f32) -> Self {
+        Self { static_gain, velocity_gain, ..self }
     }
 
     /// Lets the output change by at most `per_s` a second, more than zero. Off by default.
@@ -200,31 +180,29 @@ impl PidConfig {
     /// The output starts from zero, or from the value given to [`Pid::reset_to`](super::Pid::reset_to). The part cut off counts
     /// as saturation. A change in a step of less than half the spacing of `f32` at the output is lost: 4e-3 a second at an output
     /// of 100 and 1 kHz.
-    pub const fn with_slew_limit(mut self, per_s: f32) -> Self {
-        self.parameters.slew_per_s = per_s;
-        self
+    pub const fn with_slew_limit(self, per_s: f32) -> Self {
+        Self { parameters: Parameters { slew_per_s: per_s, ..self.parameters }, ..self }
     }
 
     /// Takes setpoint and measurement as points on a circle of `period` (360.0, 2 pi, 8192.0), more than zero.
     ///
-    /// The error and the derivative go by the shortest way. Off by default.
-    pub const fn with_period(mut self, period: f32) -> Self {
-        self.period = not_off(period);
-        self
+    /// The error and the derivative go by the shortest way. Off by default. Beyond 4 million periods `f32` holds no angle any more,
+    /// and the way is any of at most half a period.
+    pub const fn with_period(self, period: f32) -> Self {
+        Self { period: not_off(period), ..self }
     }
 
     /// Filters the derivative with a first-order low-pass of this cut-off frequency, more than zero. Off by default.
-    pub const fn with_derivative_filter(mut self, cutoff_hz: f32) -> Self {
-        self.parameters.derivative_time_s = not_off(1.0 / (core::f32::consts::TAU * cutoff_hz));
-        self
+    pub const fn with_derivative_filter(self, cutoff_hz: f32) -> Self {
+        let derivative_time_s = not_off(1.0 / (core::f32::consts::TAU * cutoff_hz));
+        Self { parameters: Parameters { derivative_time_s, ..self.parameters }, ..self }
     }
 
     /// Takes the derivative of the error, so D also responds to changes of the setpoint.
     ///
     /// The default is the derivative of the measurement, without a kick when the setpoint jumps.
-    pub const fn with_derivative_on_error(mut self) -> Self {
-        self.derivative_on_error = true;
-        self
+    pub const fn with_derivative_on_error(self) -> Self {
+        Self { derivative_on_error: true, ..self }
     }
 
     /// Leads the setpoint through a linear tracking differentiator of speed `r` in 1/s, more than zero. Off by default.
@@ -248,9 +226,8 @@ impl PidConfig {
     /// assert!((pid.output() - 0.96).abs() < 0.01);
     /// # Ok::<(), drivetrain::error::ConfigError>(())
     /// ```
-    pub const fn with_tracking(mut self, r: f32) -> Self {
-        self.tracking_r = not_off(r);
-        self
+    pub const fn with_tracking(self, r: f32) -> Self {
+        Self { tracking_r: not_off(r), ..self }
     }
 
     /// Takes the incremental form: the output is the memory. Off by default.
@@ -272,17 +249,13 @@ impl PidConfig {
     /// assert_eq!(pid.step(1.5, 0.0, &step), 6.0);
     /// # Ok::<(), drivetrain::error::ConfigError>(())
     /// ```
-    pub const fn with_incremental_form(mut self) -> Self {
-        self.incremental = true;
-        self
+    pub const fn with_incremental_form(self) -> Self {
+        Self { incremental: true, ..self }
     }
 
     /// Replaces the three gains.
-    pub const fn with_gains(mut self, kp: f32, ki: f32, kd: f32) -> Self {
-        self.parameters.kp = kp;
-        self.parameters.ki = ki;
-        self.parameters.kd = kd;
-        self
+    pub const fn with_gains(self, kp: f32, ki: f32, kd: f32) -> Self {
+        Self { parameters: Parameters { kp, ki, kd, ..self.parameters }, ..self }
     }
 
     /// Returns `(kp, ki, kd)`.
@@ -332,24 +305,23 @@ impl PidConfig {
         off_or_positive("r", self.tracking_r)
     }
 
+    /// Tells whether an option works on the setpoint: feed-forward, period, tracking, derivative of the error.
+    pub(crate) const fn needs_setpoint(&self) -> bool {
+        let has_feed_forward = self.static_gain > 0.0 || self.velocity_gain > 0.0;
+        let has_way = self.period > 0.0 || self.tracking_r > 0.0;
+        has_feed_forward || has_way || self.derivative_on_error
+    }
+
     /// Returns the options in use.
     pub(super) const fn options(&self) -> u16 {
-        const OFF: f32 = PidConfig::OFF;
-        const fn set(option: u16, is_on: bool) -> u16 {
-            if is_on { option } else { 0 }
-        }
         let p = &self.parameters;
-        set(ASYMMETRIC, p.output_lower + p.output_upper != 0.0)
-            | set(INTEGRAL_WEIGHT, p.no_rate_above < OFF)
-            | set(DEAD_BAND, p.dead_band > 0.0)
-            | set(FEED_FORWARD, self.static_gain > 0.0 || self.velocity_gain > 0.0)
-            | set(SLEW_LIMIT, p.slew_per_s < OFF)
-            | set(PERIOD, self.period > 0.0)
-            | set(DERIVATIVE_FILTER, p.derivative_time_s > 0.0)
-            | set(DERIVATIVE_ON_ERROR, self.derivative_on_error)
-            | set(TRACKING, self.tracking_r > 0.0)
-            | set(BACK_CALCULATION, p.drain_time_s > 0.0 && p.ki > 0.0)
-            | set(INCREMENTAL, self.incremental)
+        let is_even = p.output_lower + p.output_upper == 0.0 && p.no_rate_above >= Self::OFF;
+        let is_direct = p.dead_band + p.derivative_time_s == 0.0 && p.slew_per_s >= Self::OFF;
+        let is_plain = is_even && is_direct && p.drain_time_s == 0.0 && !self.needs_setpoint();
+        let shape = if is_plain { 0 } else { NOT_PLAIN };
+        let derivative = if self.derivative_on_error { DERIVATIVE_ON_ERROR } else { 0 };
+        let form = if self.incremental { INCREMENTAL } else { 0 };
+        shape | derivative | form
     }
 }
 

@@ -1,75 +1,193 @@
-//! The law of the controller, twice: plain and in full.
+//! The law of the controller, plain and in full.
 //!
 //! ```text
-//! step, step_error        from setpoint and measurement, or from an error and a rate
-//!   └─ ErrorPid::plain    gains, integral limit, one output limit; an error for all else
-//!        └─ step_in_full  every option, unguarded; if a value is not finite, once more with guards
+//! Pid::plain            error and rate from setpoint and measurement
+//!   └─ ErrorPid::plain  gains, integral limit, one output limit; refuses all else
+//! Pid::full             the same with circle, tracking, derivative of the error, feed-forward
+//!   └─ ErrorPid::full   every other option
+//!       └─ bound        limits, first calls, long steps, overflow
 //! ```
 
 use super::Pid;
 use super::config::{
-    BACK_CALCULATION, DERIVATIVE_FILTER, DERIVATIVE_ON_ERROR, FEED_FORWARD, GIVEN, OF_SETPOINT,
-    PERIOD, REST_DERIVATIVE, SLEW_LIMIT, TRACK_OUTPUT, TRACKING,
+    DERIVATIVE_ON_ERROR, INCREMENTAL, NOT_PLAIN, Parameters, REST_DERIVATIVE, TRACK_OUTPUT,
 };
-use super::error_pid::ErrorPid;
 use crate::control::number::{finite, limited};
 use crate::math;
 use crate::time::TimeStep;
 
+/// A controller whose error is formed elsewhere: the part of a [`Pid`] that knows neither setpoint nor measurement.
+///
+/// Options of the setpoint (feed-forward, period, tracking, derivative of the error) do not apply and need no storage.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+// What each step stores stands first, and what it reads next to it.
+#[repr(C)]
+pub(crate) struct ErrorPid {
+    pub(super) error: f32,
+    pub(super) rate: f32,
+    pub(super) output: f32,
+    pub(super) integral: f32,
+    /// Of the integral; closed unless the controller is plain.
+    pub(super) integral_gate: u32,
+    /// Of the output; equal to the gate of the integral unless the controller is plain.
+    pub(super) output_gate: u32,
+    pub(super) parameters: Parameters,
+    pub(super) options: u16,
+    pub(super) rejected: u16,
+}
+
+const _: () = assert!(size_of::<ErrorPid>() <= 72, "one for each motor of a bus");
+
 impl ErrorPid {
+    /// Makes a change, or a step with a given error, as the whole controller does.
+    pub(crate) fn as_pid<T>(&mut self, change: impl FnOnce(&mut Pid) -> T) -> T {
+        let mut whole = Pid::of_error(*self);
+        let done = change(&mut whole);
+        *self = whole.core;
+        done
+    }
+
     /// The plain law: gains, integral limit, one output limit.
     ///
     /// # Errors
-    /// If the step needs more, nothing changes. The returned value is finite if `valid` and `error` are.
+    /// If the step needs more, nothing changes; the value tells whether the error is known to be finite.
     #[inline(always)]
-    pub(crate) fn plain(
-        &mut self,
-        (error, rate): (f32, f32),
-        valid: f32,
-        step: &TimeStep,
-    ) -> Result<f32, f32> {
-        let parameters = &self.parameters;
-        let growth = parameters.ki * step.half_dt_s * (error + self.error);
-        let integral = self.integral + growth;
+    pub(crate) fn plain(&mut self, error: f32, rate: f32, step: &TimeStep) -> Plain {
+        let growth = self.parameters.ki * step.half_dt_s * (error + self.error);
+        let mut integral = self.integral + growth;
         // With options, NaN and infinity nothing passes.
         if !passes(integral, self.integral_gate) {
-            return Err(valid);
+            return Err(false);
         }
-        let output = parameters.kp * error + integral - parameters.kd * rate;
-        if passes(output, self.output_gate) {
-            self.keep(output, error, rate, integral);
-            return Ok(output);
+        let mut output = self.parameters.kp * error + integral - self.parameters.kd * rate;
+        if !passes(output, self.output_gate) {
+            if !output.is_finite() {
+                return Err(true);
+            }
+            let is_outward = (output.to_bits() ^ growth.to_bits()).cast_signed() >= 0;
+            integral = if is_outward { self.integral } else { integral };
+            output = limit_of(self.output_gate).copysign(output);
         }
-        if !output.is_finite() {
-            return Err(error);
-        }
-        let limit = limit_of(self.output_gate).copysign(output);
-        let integral = if are_alike(output, growth) { self.integral } else { integral };
-        self.keep(limit, error, rate, integral);
-        Ok(limit)
+        self.keep(output, error, rate, integral);
+        Ok(output)
     }
 
+    /// The law with all options but those of the setpoint, for a finite error.
     #[inline(always)]
-    pub(crate) const fn is_limited(&self) -> bool {
-        self.parameters.output_upper < f32::MAX
+    fn full(&mut self, error: f32, mut rate: f32, feed_forward: f32, step: &TimeStep) -> f32 {
+        let p = &self.parameters;
+        if p.derivative_time_s > 0.0 {
+            let gain = step.dt_s / (step.dt_s + p.derivative_time_s);
+            rate = self.rate + gain * (rate - self.rate);
+        }
+        let (size, mut proportional) = (error.abs(), p.kp * error);
+        // Not finite in a first call and in a frozen step, whatever the weight.
+        let mut growth = p.ki * step.half_dt_s * (error + self.error);
+        if size > p.full_rate_below {
+            let weight = (p.no_rate_above - size) / (p.no_rate_above - p.full_rate_below);
+            growth *= if weight > 0.0 { weight } else { 0.0 };
+        }
+        if size < p.dead_band {
+            proportional = 0.0;
+            let shrinks = growth * self.integral < 0.0;
+            if !shrinks {
+                growth *= 0.0; // and not simply zero: what is not finite must show
+            }
+        }
+        let integral = self.integral + growth;
+        let pushed = proportional + feed_forward;
+        let wanted = pushed - p.kd * rate + integral;
+        let way = (wanted - self.output).abs();
+        let is_slow = way <= p.slew_per_s * step.dt_s || p.slew_per_s >= f32::MAX;
+        let is_within = wanted <= p.output_upper && wanted >= p.output_lower;
+        if is_slow && is_within && passes(integral, self.integral_limit_gate()) {
+            self.keep(wanted, error, rate, integral);
+            return wanted;
+        }
+        self.bound(error, rate, pushed, growth, step)
     }
 
-    #[inline(always)]
+    /// Ends a step of which a part is not finite or at a limit; `pushed` is P and feed-forward.
+    #[inline(never)]
+    fn bound(&mut self, error: f32, rate: f32, pushed: f32, growth: f32, step: &TimeStep) -> f32 {
+        let p = &self.parameters;
+        let limit = limit_of(self.integral_limit_gate());
+        let (mut memory, mut rate, mut growth) = (self.integral, rate, growth);
+        let mut others = pushed - p.kd * rate;
+        if !(others + growth).is_finite() {
+            let is_first = self.error == UNKNOWN;
+            // No interval yet, or too long an interval.
+            if is_first || step.is_frozen() {
+                self.rejected = self.rejected.saturating_add(u16::from(!is_first));
+                growth = 0.0;
+            }
+            (rate, growth) = (finite(rate), finite(growth));
+            others = finite(finite(pushed) - finite(p.kd * rate));
+            if self.options & TRACK_OUTPUT != 0 && self.has_memory() {
+                memory = finite(self.output - others);
+            }
+            self.options &= !TRACK_OUTPUT;
+        }
+        let mut integral = limited(memory + growth, -limit, limit);
+        let wanted = others + integral;
+        let has_slew_limit = p.slew_per_s < f32::MAX;
+        let reach = if has_slew_limit { p.slew_per_s * step.dt_s } else { f32::INFINITY };
+        let near = limited(wanted, self.output - reach, self.output + reach);
+        let output = self.within_output_range(near);
+        let excess = wanted - output;
+        if p.drain_time_s > 0.0 && p.ki > 0.0 {
+            let part = limited(step.dt_s / p.drain_time_s, 0.0, 1.0);
+            integral = limited(integral - finite(excess) * part, -limit, limit);
+        } else if excess * (integral - memory) > 0.0 {
+            integral = memory;
+        }
+        self.keep(output, error, rate, integral);
+        output
+    }
+
     const fn keep(&mut self, output: f32, error: f32, rate: f32, integral: f32) {
         self.output = output;
         self.error = error;
         self.rate = rate;
         self.integral = integral;
     }
+
+    /// Tells whether the memory may hold a value.
+    pub(super) const fn has_memory(&self) -> bool {
+        self.parameters.ki > 0.0 || self.options & INCREMENTAL != 0
+    }
+
+    /// Tells whether the plain law knows all options that are on: gains, integral limit, one output limit.
+    pub(crate) const fn is_plain(&self) -> bool {
+        self.options & NOT_PLAIN == 0
+    }
+
+    /// Tells whether the output has limits.
+    pub(crate) const fn is_limited(&self) -> bool {
+        self.parameters.output_upper < f32::MAX
+    }
+
+    /// Returns what the output limits leave of `value`.
+    pub(in crate::control) const fn within_output_range(&self, value: f32) -> f32 {
+        limited(value, self.parameters.output_lower, self.parameters.output_upper)
+    }
+
+    pub(super) const fn integral_limit_gate(&self) -> u32 {
+        if self.integral_gate != CLOSED { self.integral_gate } else { self.output_gate }
+    }
+
+    /// Opens the plain law, or closes it.
+    pub(super) const fn set_options(&mut self, options: u16) {
+        let limit = self.integral_limit_gate();
+        let is_plain = options & (NOT_PLAIN | REST_DERIVATIVE) == 0;
+        self.integral_gate = if is_plain { limit } else { CLOSED };
+        self.output_gate = if is_plain { gate(self.parameters.output_upper) } else { limit };
+        self.options = options;
+    }
 }
 
 impl Pid {
-    /// Tells whether the output has limits.
-    #[inline(always)]
-    pub(crate) const fn is_limited(&self) -> bool {
-        self.core.is_limited()
-    }
-
     /// Steps by a validated time step, and returns the output.
     ///
     /// Costs 30 instructions on a Cortex-M4F, with limits, while the output is free (`docs/figures.md`).
@@ -88,15 +206,10 @@ impl Pid {
     pub fn step(&mut self, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
         let (error, travel) = (setpoint - measurement, measurement - self.measurement);
         let rate = travel * step.per_dt;
-        match self.step_plain(setpoint, measurement, step) {
+        match self.plain(setpoint, measurement, step) {
             Ok(output) => output,
-            Err(valid) => self.step_in_full::<false>(
-                (valid, measurement),
-                (error, rate),
-                travel,
-                step,
-                self.core.options,
-            ),
+            Err(true) => self.full(error, measurement, error, rate, step),
+            Err(false) => self.full(setpoint, measurement, error, rate, step),
         }
     }
 
@@ -116,254 +229,97 @@ impl Pid {
     /// ```
     #[inline]
     pub fn step_error(&mut self, error: f32, rate: f32, step: &TimeStep) -> f32 {
-        match self.core.plain((error, rate), error, step) {
-            Ok(output) => {
-                self.measurement = UNKNOWN;
-                output
-            }
-            Err(valid) => {
-                let options = self.core.options & !OF_SETPOINT | GIVEN;
-                self.step_in_full::<false>((valid, UNKNOWN), (error, rate), 0.0, step, options)
-            }
+        if let Ok(output) = self.core.plain(error, rate, step) {
+            self.measurement = UNKNOWN;
+            return output;
         }
+        self.given(error, rate, step)
     }
 
-    /// The step of a [plain](Self::is_plain) controller.
+    /// The step of any controller with a given error.
+    #[inline(never)]
+    fn given(&mut self, error: f32, rate: f32, step: &TimeStep) -> f32 {
+        if step.is_hold() || !error.is_finite() || !rate.is_finite() {
+            return self.refuse(false);
+        }
+        self.measurement = UNKNOWN;
+        self.tracking_rate = 0.0;
+        self.core.set_options(self.core.options & !REST_DERIVATIVE);
+        let rate = if step.is_frozen() { self.core.rate } else { rate };
+        self.core.full(error, rate, 0.0, step)
+    }
+
+    /// The plain step.
     ///
     /// # Errors
-    /// As [`ErrorPid::plain`]. The value returned is finite if setpoint and measurement are.
+    /// As [`ErrorPid::plain`].
     #[inline(always)]
-    pub(crate) fn step_plain(
-        &mut self,
-        setpoint: f32,
-        measurement: f32,
-        step: &TimeStep,
-    ) -> Result<f32, f32> {
-        let (error, travel) = (setpoint - measurement, measurement - self.measurement);
-        let output = self.core.plain((error, travel * step.per_dt), setpoint, step)?;
-        self.measurement = measurement;
+    pub(crate) fn plain(&mut self, setpoint: f32, measured: f32, step: &TimeStep) -> Plain {
+        let (error, travel) = (setpoint - measured, measured - self.measurement);
+        let output = self.core.plain(error, travel * step.per_dt, step)?;
+        self.measurement = measured;
         Ok(output)
     }
 
-    /// The step of any controller, with error and rate as the plain step takes them.
-    ///
-    /// Unless `GUARDED`, a value that is not finite shows before anything has changed, and the guarded step takes over. Bad
-    /// arguments, a step that is not normal and the first call, whose unknown values are not finite, show in the same way.
+    /// The step of any controller, with error and rate as the plain step takes them: applies the options of the setpoint. `valid`
+    /// is finite if the setpoint is.
     #[inline(never)]
-    fn step_in_full<const GUARDED: bool>(
-        &mut self,
-        (valid, measurement): (f32, f32),
-        (error, rate): (f32, f32),
-        travel: f32,
-        step: &TimeStep,
-        options: u16,
-    ) -> f32 {
-        let finite = |value| if GUARDED { finite(value) } else { value };
-        let on = |option| options & option != 0;
-        if GUARDED {
-            let other = if on(GIVEN) { rate } else { measurement };
-            if step.is_hold() || !valid.is_finite() || !other.is_finite() {
-                return self.refuse(!on(GIVEN) && !step.is_hold());
+    fn full(&mut self, valid: f32, measured: f32, error: f32, rate: f32, step: &TimeStep) -> f32 {
+        let (mut error, mut rate) = (error, rate);
+        // Bad arguments, an unknown measurement, a step that is not normal, overflow.
+        if !(error + rate).is_finite() {
+            if step.is_hold() || !valid.is_finite() || !measured.is_finite() {
+                return self.refuse(!step.is_hold());
             }
+            if self.measurement == UNKNOWN || step.is_frozen() {
+                self.core.options |= REST_DERIVATIVE;
+            }
+            (error, rate) = (finite(error), finite(rate));
         }
-        'finite: {
-            let differences = (error, rate, travel);
-            let (error, rate, tracking_rate) =
-                self.differences::<GUARDED>(differences, step, options);
-            let (proportional, growth) = self.proportional_and_growth::<GUARDED>(error, step);
-            let mut others = finite(proportional - finite(self.core.parameters.kd * rate));
-            if on(FEED_FORWARD) {
-                others = finite(others + self.feed_forward(measurement, error));
-            }
-            let mut memory = self.core.integral;
-            if GUARDED && on(TRACK_OUTPUT) && self.has_memory() {
-                memory = finite(self.core.output - others);
-            }
-            let mut integral = finite(memory + growth);
-            let gate = self.core.integral_limit_gate();
-            if !passes(integral, gate) {
-                if !integral.is_finite() {
-                    break 'finite;
-                }
-                integral = limit_of(gate).copysign(integral);
-            }
-            let wanted = finite(others + integral);
-            let (mut bounded, mut is_free) = (wanted, true);
-            if on(SLEW_LIMIT) {
-                let way = wanted - self.core.output;
-                let reach = self.core.parameters.slew_per_s * step.dt_s;
-                if way.abs() > reach {
-                    (bounded, is_free) = (self.core.output + reach.copysign(way), false);
-                }
-            }
-            if GUARDED {
-                if step.is_frozen() && self.core.error != UNKNOWN {
-                    self.core.rejected = self.core.rejected.saturating_add(1);
-                }
-                self.core.set_options(self.core.options & !(REST_DERIVATIVE | TRACK_OUTPUT));
-            }
-            let (lower, upper) =
-                (self.core.parameters.output_lower, self.core.parameters.output_upper);
-            if is_free && wanted <= upper && wanted >= lower {
-                self.tracking_rate = tracking_rate;
-                self.keep(wanted, measurement, error, rate, integral);
-                return wanted;
-            }
-            if !wanted.is_finite() {
-                break 'finite;
-            }
-            let output = limited(bounded, lower, upper);
-            integral = self.without_windup(wanted - output, memory, integral, step);
-            self.tracking_rate = tracking_rate;
-            self.keep(output, measurement, error, rate, integral);
-            return output;
+        if self.way > 0.0 {
+            error = math::shortest(error, self.way);
+            rate = math::shortest(measured - self.measurement, self.way) * step.per_dt;
+        } else if self.way < 0.0 {
+            error = self.follow(error, measured, step);
         }
-        if GUARDED {
-            return self.core.output; // never: all of it is finite
+        if self.core.options & DERIVATIVE_ON_ERROR != 0 {
+            let way = self.core.error - error;
+            let way = if self.way > 0.0 { math::shortest(way, self.way) } else { way };
+            rate = way * step.per_dt;
         }
-        self.step_in_full::<true>((valid, measurement), (error, rate), travel, step, options)
+        if self.core.options & REST_DERIVATIVE != 0 {
+            rate = self.core.rate;
+            self.core.set_options(self.core.options & !REST_DERIVATIVE);
+        }
+        let feed_forward = self.feed_forward(measured + error);
+        self.measurement = measured;
+        self.core.full(error, rate, feed_forward, step)
     }
 
-    /// Returns the effective error, the filtered rate of change, and the rate of a tracked setpoint. Unless `GUARDED`, an unknown
-    /// error or rate is not finite.
-    #[inline(always)]
-    fn differences<const GUARDED: bool>(
-        &self,
-        (mut error, mut rate, travel): (f32, f32, f32),
-        step: &TimeStep,
-        options: u16,
-    ) -> (f32, f32, f32) {
-        let finite = |value| if GUARDED { finite(value) } else { value };
-        let on = |option| options & option != 0;
-        let mut tracking_rate = self.tracking_rate;
-        if on(PERIOD) {
-            error = self.shortest::<GUARDED>(error);
-            if !self.is_short(travel) {
-                rate = finite(self.shortest::<GUARDED>(travel)) * step.per_dt;
-            }
-        }
-        (error, rate) = (finite(error), finite(rate));
-        if on(TRACKING | DERIVATIVE_ON_ERROR | REST_DERIVATIVE) {
-            if on(TRACKING) {
-                (error, tracking_rate) = self.follow::<GUARDED>(error, travel, step);
-            }
-            if on(DERIVATIVE_ON_ERROR) {
-                let travel = self.core.error - error;
-                let travel = if on(PERIOD) { self.shortest::<GUARDED>(travel) } else { travel };
-                rate = finite(finite(travel) * step.per_dt);
-            }
-            if !GUARDED && (on(REST_DERIVATIVE) || !tracking_rate.is_finite()) {
-                rate = f32::NAN;
-            }
-        }
-        if GUARDED {
-            let of_error = on(DERIVATIVE_ON_ERROR) && self.core.error != UNKNOWN;
-            if step.is_frozen() || on(REST_DERIVATIVE) && !on(GIVEN) {
-                rate = self.core.rate;
-            } else if self.measurement == UNKNOWN && !of_error && !on(GIVEN) {
-                rate = 0.0;
-            }
-        }
-        if on(DERIVATIVE_FILTER) {
-            let gain = step.dt_s / (step.dt_s + self.core.parameters.derivative_time_s);
-            rate = finite(self.core.rate + gain * (rate - self.core.rate));
-        }
-        (error, rate, tracking_rate)
+    /// Moves the tracked setpoint on, and returns its error: the linear tracking differentiator by Euler's rule.
+    ///
+    /// The setpoint of the last step is `measurement + error`, so only its rate has to be stored.
+    fn follow(&mut self, error: f32, measured: f32, step: &TimeStep) -> f32 {
+        let (r, rate) = (-self.way, self.tracking_rate);
+        let is_known = self.measurement != UNKNOWN;
+        let last = if is_known { self.core.error - (measured - self.measurement) } else { 0.0 };
+        let (longest_s, pull) = (1.0 / r, r * (last - error) + 2.0 * rate);
+        let dt_s = if step.dt_s > longest_s { longest_s } else { step.dt_s };
+        self.tracking_rate = finite(rate - dt_s * (r * pull));
+        finite(last + dt_s * rate)
     }
 
-    /// Returns P, and the increment of I.
-    #[inline(always)]
-    fn proportional_and_growth<const GUARDED: bool>(
-        &self,
-        error: f32,
-        step: &TimeStep,
-    ) -> (f32, f32) {
-        let finite = |value| if GUARDED { finite(value) } else { value };
-        let parameters = &self.core.parameters;
-        let (mut before, mut half_dt_s) = (self.core.error, step.half_dt_s);
-        if GUARDED && before == UNKNOWN {
-            before = -error; // no interval yet: a mean of zero
-        }
-        if GUARDED && step.is_frozen() {
-            half_dt_s = 0.0;
-        }
-        let mut proportional = finite(parameters.kp * error);
-        let mut growth = finite(parameters.ki * half_dt_s * (error + before));
-        let is_near = error.abs() <= parameters.full_rate_below;
-        if !is_near {
-            growth *= self.weight(error);
-        }
-        if error.abs() < parameters.dead_band {
-            proportional = 0.0;
-            let shrinks = growth * self.core.integral < 0.0;
-            if !shrinks {
-                growth *= 0.0; // and not simply zero: what is not finite must show
-            }
-        }
-        (proportional, growth)
-    }
-
-    #[inline(always)]
-    const fn keep(&mut self, output: f32, measurement: f32, error: f32, rate: f32, integral: f32) {
-        self.measurement = measurement;
-        self.core.keep(output, error, rate, integral);
-    }
-
-    /// Returns whether a way is less than half a turn. Half a turn itself, and overflow, need another look.
-    #[inline]
-    const fn is_short(&self, way: f32) -> bool {
-        passes(way, self.way_gate)
-    }
-
-    /// Returns the shortest of the ways that differ by whole periods. Unless `GUARDED`, NaN for half a turn and overflow.
-    #[inline]
-    fn shortest<const GUARDED: bool>(&self, way: f32) -> f32 {
-        if self.is_short(way) {
-            return way;
-        }
-        if GUARDED {
-            return math::wrap(way, self.period());
-        }
-        let rest = math::rest(way, self.period());
-        if self.is_short(rest) { rest } else { f32::NAN }
-    }
-
-    /// Returns the share of its rate at which the integral works at an error beyond the full rate.
-    #[inline]
-    fn weight(&self, error: f32) -> f32 {
-        let (size, none) = (error.abs(), self.core.parameters.no_rate_above);
-        if size >= none {
-            0.0
-        } else {
-            (none - size) / (none - self.core.parameters.full_rate_below)
-        }
-    }
-
-    /// Returns the integral after anti-windup, for an `excess` cut off the output by the limits.
-    #[inline]
-    fn without_windup(&self, excess: f32, before: f32, integral: f32, step: &TimeStep) -> f32 {
-        if self.core.options & BACK_CALCULATION == 0 {
-            let is_outward = are_alike(excess, integral - before);
-            return if is_outward { before } else { integral };
-        }
-        let part = step.dt_s / self.core.parameters.drain_time_s;
-        let drained = integral - excess * if part < 1.0 { part } else { 1.0 };
-        let gate = self.core.integral_limit_gate();
-        if passes(drained, gate) {
-            drained
-        } else if drained.is_nan() {
-            integral // an excess beyond f32, of which no part is drained
-        } else {
-            limit_of(gate).copysign(drained)
-        }
+    /// Holds the output and counts the step. If time passed without a measurement, D rests in the next good step: the travel
+    /// spans more than one step.
+    fn refuse(&mut self, rests: bool) -> f32 {
+        self.core.rejected = self.core.rejected.saturating_add(1);
+        self.core.set_options(self.core.options | if rests { REST_DERIVATIVE } else { 0 });
+        self.core.output
     }
 }
 
-/// Tells whether two numbers have the same sign.
-#[inline(always)]
-const fn are_alike(one: f32, other: f32) -> bool {
-    (one.to_bits() ^ other.to_bits()).cast_signed() >= 0
-}
+/// The output; or whether the error is known to be finite.
+pub(crate) type Plain = Result<f32, bool>;
 
 /// Marks a stored error or measurement as unknown: arithmetic with it never passes a [`gate`].
 pub(super) const UNKNOWN: f32 = f32::INFINITY;
@@ -373,29 +329,16 @@ pub(super) const CLOSED: u32 = 0;
 
 /// Encodes a limit for one integer comparison: the value is within ±`limit`, and neither NaN nor infinite.
 pub(super) const fn gate(limit: f32) -> u32 {
-    open_gate(limit) + 1
-}
-
-/// As [`gate`], but exactly `limit` does not pass. Zero gives [`CLOSED`].
-pub(super) const fn open_gate(limit: f32) -> u32 {
-    limit.to_bits() << 1
+    (limit.to_bits() << 1) + 1
 }
 
 /// Returns the limit encoded by a gate.
-#[inline(always)]
 pub(super) const fn limit_of(gate: u32) -> f32 {
     f32::from_bits(gate >> 1)
 }
 
-#[inline(always)]
-pub(super) const fn passes(value: f32, gate: u32) -> bool {
-    magnitude(value) < gate
-}
-
-/// Sizes in an order for one integer comparison; NaN is larger than all numbers.
-#[inline(always)]
-const fn magnitude(value: f32) -> u32 {
-    value.to_bits() << 1
+const fn passes(value: f32, gate: u32) -> bool {
+    value.to_bits() << 1 < gate
 }
 
 #[cfg(test)]
@@ -407,16 +350,17 @@ mod tests {
 
     fn stepped(pid: &mut Pid, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
         let plain =
-            if pid.is_plain() { pid.step_plain(setpoint, measurement, step).ok() } else { None };
+            if pid.core.is_plain() { pid.plain(setpoint, measurement, step).ok() } else { None };
         plain.unwrap_or_else(|| pid.step(setpoint, measurement, step))
     }
 
     fn stepped_by(pid: &mut Pid, error: f32, rate: f32, step: &TimeStep) -> f32 {
-        let mut part = *pid.core();
-        let plain = part.plain((error, rate), error, step);
-        let output = plain.unwrap_or_else(|_| part.advance(error, rate, step));
+        let mut part = pid.core;
+        let plain = part.plain(error, rate, step).ok();
+        let output =
+            plain.unwrap_or_else(|| part.as_pid(|whole| whole.step_error(error, rate, step)));
         let whole = pid.step_error(error, rate, step);
-        assert_eq!((output, &part), (whole, pid.core()));
+        assert_eq!((output, part), (whole, pid.core));
         whole
     }
 
@@ -439,7 +383,7 @@ mod tests {
                 _ => config,
             };
             let (mut one, mut other) = (Pid::new(config).unwrap(), Pid::new(config).unwrap());
-            prop_assert_eq!(one.is_plain(), option > 2);
+            prop_assert_eq!(one.core.is_plain(), option > 2);
             for (given, first, second, kind) in steps {
                 let step = TimeStep::of(match kind { 0 => 1.0, 1 => f32::NAN, _ => 0.001 });
                 let first = match kind { 2 => f32::NAN, 3 => f32::MAX, _ => first };

@@ -1,17 +1,15 @@
 //! The PID controller.
 
 mod config;
-mod error_pid;
 mod law;
 
 pub use config::PidConfig;
-pub(crate) use error_pid::ErrorPid;
+pub(crate) use law::ErrorPid;
 
-use crate::control::number::{finite, limited};
-use crate::error::{ConfigError, check, gains};
-use crate::time::TimeStep;
-use config::{DERIVATIVE_ON_ERROR, INCREMENTAL, REST_DERIVATIVE, TRACK_OUTPUT, TRACKING};
-use law::{CLOSED, UNKNOWN, gate, limit_of, open_gate};
+use crate::control::number::{finite, friction, limited};
+use crate::error::{ConfigError, check};
+use config::{DERIVATIVE_ON_ERROR, INCREMENTAL, REST_DERIVATIVE, TRACK_OUTPUT};
+use law::{CLOSED, UNKNOWN, gate, limit_of};
 
 /// A PID controller, positional or incremental, with the options of its [`PidConfig`].
 ///
@@ -43,7 +41,8 @@ use law::{CLOSED, UNKNOWN, gate, limit_of, open_gate};
 ///   [`TimeStep::of`](crate::time::TimeStep::of) such a loop has no integral at 9.9 Hz, and half of it at 100.05 and 99.95 ms
 ///   in turn.
 /// * NaN or infinity in any input: the last output is returned, [`rejected`](Self::rejected) grows, and the integral stays. D
-///   rests in the next good step and keeps its value, since the travel of the missing time spans more than one step.
+///   rests in the next good step and keeps its value, since the travel of the missing time spans more than one step. D
+///   rests too in the first step after steps with a [given error](Self::step_error): the last measurement is unknown.
 /// * `ki` zero: the integral is zero and stays zero; the memory of the incremental form stays.
 /// * Gains or inputs so large that `f32` overflows: the output is the limit (±`f32::MAX` without a limit), never NaN,
 ///   and every stored value stays finite.
@@ -83,16 +82,16 @@ use law::{CLOSED, UNKNOWN, gate, limit_of, open_gate};
 pub struct Pid {
     // Beside the error and the rate of the core: a step stores all three by one instruction.
     measurement: f32,
-    core: ErrorPid,
-    /// Of half the period; or the bits of the speed of tracking.
-    way_gate: u32,
+    /// The part for errors that are formed elsewhere.
+    pub(crate) core: ErrorPid,
+    /// The period; or the speed of tracking, negative.
+    way: f32,
     /// The rate of the tracked setpoint.
     tracking_rate: f32,
     static_gain: f32,
     velocity_gain: f32,
 }
 
-#[cfg(target_pointer_width = "32")]
 const _: () = assert!(size_of::<Pid>() <= 92, "one for each motor of a bus");
 
 /// The parts of the last output, in its unit.
@@ -120,7 +119,17 @@ impl Pid {
     /// Names the parameter that is NaN, infinite, negative, zero where zero is invalid, or reversed.
     pub const fn new(config: PidConfig) -> Result<Self, ConfigError> {
         check!(config.validate());
-        let mut pid = Self::of_error(ErrorPid::new(config.parameters));
+        let mut pid = Self::of_error(ErrorPid {
+            error: UNKNOWN,
+            rate: 0.0,
+            output: 0.0,
+            integral: 0.0,
+            integral_gate: CLOSED,
+            output_gate: CLOSED,
+            parameters: config.parameters,
+            options: 0,
+            rejected: 0,
+        });
         pid.store(&config);
         Ok(pid)
     }
@@ -130,22 +139,19 @@ impl Pid {
         Self {
             measurement: UNKNOWN,
             core,
-            way_gate: CLOSED,
+            way: 0.0,
             tracking_rate: 0.0,
             static_gain: 0.0,
             velocity_gain: 0.0,
         }
     }
 
-    /// Returns the part for errors that are formed elsewhere.
-    pub(crate) const fn core(&self) -> &ErrorPid {
-        &self.core
-    }
-
     /// Forgets everything but the configuration and the count of rejected steps: the next call is a first call.
     pub const fn reset(&mut self) {
-        self.forget_setpoint();
-        self.core.reset();
+        self.interrupt();
+        self.core.integral = 0.0;
+        self.core.output = 0.0;
+        self.core.options &= !TRACK_OUTPUT;
     }
 
     /// Keeps the integral, and forgets the values from which the next step would integrate, differentiate and track: for
@@ -166,13 +172,11 @@ impl Pid {
     /// # Ok::<(), drivetrain::error::ConfigError>(())
     /// ```
     pub const fn interrupt(&mut self) {
-        self.forget_setpoint();
-        self.core.interrupt();
-    }
-
-    const fn forget_setpoint(&mut self) {
         self.measurement = UNKNOWN;
         self.tracking_rate = 0.0;
+        self.core.error = UNKNOWN;
+        self.core.rate = 0.0;
+        self.core.set_options(self.core.options & !REST_DERIVATIVE);
     }
 
     /// Resets, and lets the first call return `output`, within the limits, for any error: to take over from another
@@ -181,8 +185,10 @@ impl Pid {
     /// The memory carries the difference to P, as far as its limit reaches. In the positional form with `ki` zero there is no
     /// memory, and `output` is only the start of a slew limit. NaN and infinity count as zero.
     pub const fn reset_to(&mut self, output: f32) {
-        self.forget_setpoint();
-        self.core.reset_to(output);
+        self.reset();
+        let start = if output.is_finite() { output } else { 0.0 };
+        self.core.output = self.core.within_output_range(start);
+        self.core.options |= TRACK_OUTPUT;
     }
 
     /// Changes the gains without a jump of P: the memory takes up the difference.
@@ -194,9 +200,7 @@ impl Pid {
     /// # Errors
     /// Names a gain that is NaN, infinite or negative; then nothing changes.
     pub fn set_gains(&mut self, kp: f32, ki: f32, kd: f32) -> Result<(), ConfigError> {
-        gains(kp, ki, kd)?;
-        self.change(&self.config().with_gains(kp, ki, kd));
-        Ok(())
+        self.set_config(self.config().with_gains(kp, ki, kd))
     }
 
     /// Changes the configuration without a jump of P and feed-forward, as [`set_gains`](Self::set_gains) does; new limits hold
@@ -206,26 +210,34 @@ impl Pid {
     /// Names the parameter as [`new`](Self::new) does; then nothing changes.
     pub fn set_config(&mut self, config: PidConfig) -> Result<(), ConfigError> {
         config.validate()?;
-        self.change(&config);
+        let sum = |terms: Terms| terms.p + terms.i + terms.d + terms.feed_forward;
+        let before = self.terms();
+        let last = sum(before);
+        let held = self.core.within_output_range(last);
+        self.store(&config);
+        let after = self.terms();
+        let d = if config.incremental { after.d } else { before.d };
+        let mut change = finite(held - sum(Terms { d, ..after }));
+        if (last - held) * change < 0.0 {
+            change = 0.0; // towards the limit: the memory would be wound up
+        }
+        let limit = if self.core.has_memory() { config.integral_limit } else { 0.0 };
+        self.core.integral = limited(self.core.integral + change, -limit, limit);
         Ok(())
     }
 
     /// Returns the parts of the last output.
     #[must_use]
     pub fn terms(&self) -> Terms {
-        let parameters = &self.core.parameters;
-        let is_known = self.core.error != UNKNOWN;
-        let is_measured = is_known && self.measurement != UNKNOWN;
-        let counts = is_known && self.core.error.abs() >= parameters.dead_band;
+        let (core, p) = (&self.core, &self.core.parameters);
+        let counts = core.error != UNKNOWN && core.error.abs() >= p.dead_band;
+        let is_measured = self.measurement != UNKNOWN;
+        let setpoint = if is_measured { self.measurement + core.error } else { 0.0 };
         Terms {
-            p: parameters.kp * if counts { self.core.error } else { 0.0 },
-            i: self.core.integral,
-            d: -(parameters.kd * self.core.rate),
-            feed_forward: if is_measured {
-                self.feed_forward(self.measurement, self.core.error)
-            } else {
-                0.0
-            },
+            p: if counts { p.kp * core.error } else { 0.0 },
+            i: core.integral,
+            d: -(p.kd * core.rate),
+            feed_forward: self.feed_forward(setpoint),
         }
     }
 
@@ -237,14 +249,13 @@ impl Pid {
 
     /// Returns the configuration.
     pub const fn config(&self) -> PidConfig {
-        let tracks = self.core.options & TRACKING != 0;
         PidConfig {
             parameters: self.core.parameters,
             integral_limit: limit_of(self.core.integral_limit_gate()),
             static_gain: self.static_gain,
             velocity_gain: self.velocity_gain,
-            period: if tracks { 0.0 } else { self.period() },
-            tracking_r: if tracks { self.tracking_r() } else { 0.0 },
+            period: if self.way > 0.0 { self.way } else { 0.0 },
+            tracking_r: if self.way < 0.0 { -self.way } else { 0.0 },
             derivative_on_error: self.core.options & DERIVATIVE_ON_ERROR != 0,
             incremental: self.core.options & INCREMENTAL != 0,
         }
@@ -255,11 +266,6 @@ impl Pid {
     #[must_use]
     pub const fn rejected(&self) -> u16 {
         self.core.rejected
-    }
-
-    /// Returns whether the plain step knows all options in use: gains, integral limit, one output limit.
-    pub(crate) const fn is_plain(&self) -> bool {
-        self.core.is_plain()
     }
 
     /// Takes the part of the last output passed by a limit beyond this loop, and keeps the integral within its size: a
@@ -274,64 +280,9 @@ impl Pid {
         self.core.integral = limited(self.core.integral, lowest, highest);
     }
 
-    /// Returns `value` within the output limits.
-    pub(in crate::control) const fn within_output_range(&self, value: f32) -> f32 {
-        self.core.within_output_range(value)
-    }
-
-    /// Returns whether the memory may hold a value.
-    const fn has_memory(&self) -> bool {
-        self.core.parameters.ki > 0.0 || self.core.options & INCREMENTAL != 0
-    }
-
-    /// Returns the period of a controller without tracking.
-    #[inline]
-    const fn period(&self) -> f32 {
-        2.0 * limit_of(self.way_gate)
-    }
-
-    #[inline]
-    const fn tracking_r(&self) -> f32 {
-        f32::from_bits(self.way_gate)
-    }
-
-    /// Returns the feed-forward for the setpoint, as far as [`terms`](Self::terms) knows the setpoint too.
-    #[inline]
-    const fn feed_forward(&self, measurement: f32, error: f32) -> f32 {
-        let setpoint = measurement + error;
-        let moving = self.velocity_gain * setpoint;
-        if setpoint > 0.0 {
-            moving + self.static_gain
-        } else if setpoint < 0.0 {
-            moving - self.static_gain
-        } else {
-            moving
-        }
-    }
-
-    /// Returns the error of the tracked setpoint, and its rate: the linear tracking differentiator by Euler's rule.
-    ///
-    /// The setpoint of the last step is `measurement + error`, so only its rate has to be stored.
-    #[inline(always)]
-    fn follow<const GUARDED: bool>(&self, error: f32, travel: f32, step: &TimeStep) -> (f32, f32) {
-        let finite = |value| if GUARDED { finite(value) } else { value };
-        let is_first = GUARDED && self.measurement == UNKNOWN;
-        let before = if is_first { 0.0 } else { finite(self.core.error - travel) };
-        let rate = if is_first { 0.0 } else { self.tracking_rate };
-        let (r, longest_s) = (self.tracking_r(), 1.0 / self.tracking_r());
-        let dt_s = if step.dt_s > longest_s { longest_s } else { step.dt_s };
-        let pull = finite(-r * finite(r * finite(before - error) + 2.0 * rate));
-        (finite(before + dt_s * rate), finite(rate + dt_s * pull))
-    }
-
-    /// Holds the output and counts the step. If time passed without a measurement, D rests in the next good step: the travel
-    /// spans more than one step.
-    pub(in crate::control) const fn refuse(&mut self, rests: bool) -> f32 {
-        self.core.rejected = self.core.rejected.saturating_add(1);
-        if rests {
-            self.rest_derivative();
-        }
-        self.core.output
+    /// Returns the feed-forward, as far as [`terms`](Self::terms) knows the setpoint too: as `measurement + error`.
+    const fn feed_forward(&self, setpoint: f32) -> f32 {
+        self.velocity_gain * setpoint + friction(self.static_gain, setpoint)
     }
 
     pub(in crate::control) const fn rest_derivative(&mut self) {
@@ -340,38 +291,13 @@ impl Pid {
 
     /// Stores a validated configuration.
     const fn store(&mut self, config: &PidConfig) {
+        self.way = config.period - config.tracking_r;
+        self.static_gain = config.static_gain;
+        self.velocity_gain = config.velocity_gain;
         self.core.parameters = config.parameters;
-        (self.static_gain, self.velocity_gain) = (config.static_gain, config.velocity_gain);
-        let tracks = config.tracking_r > 0.0;
-        let half_period = open_gate(0.5 * config.period);
-        self.way_gate = if tracks { config.tracking_r.to_bits() } else { half_period };
         (self.core.integral_gate, self.core.output_gate) = (CLOSED, gate(config.integral_limit));
         let state = self.core.options & (REST_DERIVATIVE | TRACK_OUTPUT);
         self.core.set_options(config.options() | state);
-    }
-
-    fn change(&mut self, config: &PidConfig) {
-        let (lower, upper) = (self.core.parameters.output_lower, self.core.parameters.output_upper);
-        let before = self.terms();
-        self.store(config);
-        let after = self.terms();
-        if !self.has_memory() {
-            self.core.integral = 0.0;
-            return;
-        }
-        let mut change = before.p - after.p + (before.feed_forward - after.feed_forward);
-        if config.incremental {
-            change += before.d - after.d;
-        }
-        let wanted = before.p + before.i + before.d + before.feed_forward;
-        let follows = wanted - change;
-        if wanted > upper {
-            change = (upper - follows).max(0.0);
-        } else if wanted < lower {
-            change = (lower - follows).min(0.0);
-        }
-        let limit = config.integral_limit;
-        self.core.integral = limited(finite(self.core.integral + change), -limit, limit);
     }
 }
 
@@ -379,7 +305,6 @@ impl Pid {
 #[expect(clippy::float_cmp, reason = "exact results are the rule under test")]
 mod tests {
     use super::*;
-    use crate::control::pid::config::FEED_FORWARD;
     use crate::time::TimeStep;
     use proptest::prelude::*;
 
@@ -1148,7 +1073,7 @@ mod tests {
             // Feed-forward is for the setpoint next to the measurement, and changes with the turns
             // of the measurement. Sixteenths are exact in f32.
             let config = PidConfig { tracking_r: 0.0, ..config.with_period(period) };
-            let turning = config.options() & FEED_FORWARD == 0;
+            let turning = config.static_gain == 0.0 && config.velocity_gain == 0.0;
             let (mut here, mut turned) = (pid(config), pid(config));
             for (setpoint, measurement, turns, others) in samples {
                 let others = if turning { others } else { 0 };
@@ -1475,7 +1400,7 @@ mod incremental {
     #[test]
     fn only_the_options_that_need_it_leave_the_plain_step() {
         let plain = incremental(1.0, 1.0, 0.1).with_output_limit(5.0).with_integral_limit(1.0);
-        assert!(pid(plain).is_plain());
+        assert!(pid(plain).core.is_plain());
         for config in [
             plain.with_tracking(10.0),
             plain.with_back_calculation(0.1),
@@ -1483,7 +1408,7 @@ mod incremental {
             plain.with_output_range(-1.0, 2.0),
             plain.with_period(1.0),
         ] {
-            assert!(!pid(config).is_plain(), "{config:?}");
+            assert!(!pid(config).core.is_plain(), "{config:?}");
         }
     }
 

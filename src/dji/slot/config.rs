@@ -1,7 +1,7 @@
 //! Configuration of a motor: at the start, and while running.
 
 use super::{NO_GAINS, Slot};
-use crate::control::{ErrorPid, Pid, PidConfig};
+use crate::control::{Pid, PidConfig};
 use crate::dji::codec::{ErrorTable, to_raw};
 use crate::dji::config::PlainConfig;
 use crate::dji::error::SteepGain;
@@ -55,7 +55,7 @@ pub(in crate::dji) const fn configured(
         (Ok(position), Ok(speed)) => (position, speed),
         (Err(error), _) | (_, Err(error)) => return Err(parameter!(error.parameter())),
     };
-    if !ErrorPid::fits(&position) {
+    if position.needs_setpoint() {
         return Err(parameter!(OPTION));
     }
     if let Some(gain) = steep_position(&position, facts) {
@@ -80,7 +80,7 @@ pub(in crate::dji) const fn configured(
         full_limit: limit_raw,
         guard: MotorGuard::NEW.with(config.opening, config.resumes),
         speed: speed_loop,
-        position: *position_loop.core(),
+        position: position_loop.core,
         generation,
         place,
         health: config.health,
@@ -139,13 +139,13 @@ pub(in crate::dji) fn set_position_loop(
 ) -> Result<(), ConfigError> {
     let facts = slot.facts.ok_or(super::DETACHED)?;
     let limit = no_load_velocity(facts, slot.rad_per_s_per_rpm);
-    if !ErrorPid::fits(&config) {
+    if config.needs_setpoint() {
         return Err(ConfigError::Unusable(OPTION));
     }
     let steep = steep_position(&config, facts);
     slot.rest_loops();
     let replaced = checked(slot.has_position_loop(), config, limit, steep)
-        .and_then(|config| slot.position.set_config(config));
+        .and_then(|config| slot.position.as_pid(|pid| pid.set_config(config)));
     slot.apply_rules();
     replaced
 }

@@ -165,7 +165,7 @@ impl Slot {
         if !self.guard.latch().active().is_empty() || self.guard.is_opening() {
             health::require_check(self);
         }
-        let is_free = self.range == Range::within(self.full_limit) && self.speed.is_plain();
+        let is_free = self.range == Range::within(self.full_limit) && self.speed.core.is_plain();
         self.duty = match self.asked {
             _ if !is_online => Duty::Rest,
             Action::Rest => Duty::Rest,
@@ -206,7 +206,8 @@ impl Slot {
             Action::Raw => return saturate(self.goal.raw(), self.range),
             Action::Rest => return 0,
         };
-        let goal = self.position.advance(way, velocity, &TimeStep::of_motor(dt_s));
+        let step = TimeStep::of_motor(dt_s);
+        let goal = self.position.as_pid(|pid| pid.step_error(way, velocity, &step));
         self.follow_velocity(goal * self.opened_part(), velocity, dt_s)
     }
 
@@ -257,27 +258,28 @@ impl Slot {
         match self.asked {
             Action::Measured => {
                 if !is_placed {
-                    self.position.reset_to(self.goal.rate());
+                    let rate = self.goal.rate();
+                    self.position.as_pid(|pid| pid.reset_to(rate));
                 }
                 // Avoids a kick at the step from one velocity to the other.
                 self.interrupt_loops();
             }
             _ if self.asked.is_way() && !is_placed => {
                 let velocity = self.velocity().as_rad_per_s();
-                self.position.reset_to(velocity);
+                self.position.as_pid(|pid| pid.reset_to(velocity));
             }
             _ => {}
         }
         self.apply_rules();
     }
 
-    const fn reset_loops(&mut self) {
-        self.position.reset();
+    fn reset_loops(&mut self) {
+        self.position.as_pid(Pid::reset);
         self.speed.reset();
     }
 
-    const fn interrupt_loops(&mut self) {
-        self.position.interrupt();
+    fn interrupt_loops(&mut self) {
+        self.position.as_pid(Pid::interrupt);
         self.speed.interrupt();
     }
 

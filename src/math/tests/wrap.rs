@@ -48,6 +48,16 @@ fn a_bad_period_is_nan() {
 }
 
 #[test]
+fn the_shortest_way_stays_in_range_for_any_argument() {
+    for x in [180.0, -180.0, 540.0, 1e7, -6.1e9, 3e12, f32::MAX, f32::MIN, f32::NAN, f32::INFINITY]
+    {
+        let way = shortest(x, 360.0);
+        assert!((-180.0..180.0).contains(&way), "{x} {way}");
+        assert!(x.abs() > 1e9 || x.is_nan() || way == wrap(x, 360.0), "{x} {way}");
+    }
+}
+
+#[test]
 fn huge_arguments_stay_in_range() {
     for x in [1e7, 3e7, -6.1e8, 1e20, f32::MAX, f32::MIN] {
         assert!((-PI..PI).contains(&wrap_pi(x)) && (0.0..TAU).contains(&wrap_tau(x)));
@@ -98,6 +108,15 @@ fn any_x() -> impl Strategy<Value = f32> {
 }
 
 proptest! {
+    #[test]
+    fn the_shortest_way_is_the_wrapped_way_to_within_the_spacing(
+        x in -1e5_f32..1e5, period in 0.1_f32..1e4,
+    ) {
+        let way = shortest(x, period);
+        prop_assert!((-0.5 * period..0.5 * period).contains(&way), "{way}");
+        prop_assert!(congruence(way, x, period.into()) <= 2.0 * spacing(x), "{way}");
+    }
+
     #[test]
     fn results_are_in_range(x in any_x(), period in 1e-3_f32..1e6) {
         prop_assert!((-0.5 * period..0.5 * period).contains(&wrap(x, period)));
