@@ -23,7 +23,7 @@ pub struct Statistics {
     pub malformed: u32,
     /// Errors of the driver when asked for a frame.
     pub receive_errors: ErrorCounts,
-    /// Frames offered to the driver, but for those that a poll offers again in vain.
+    /// Frames offered to the driver; refused offers of a poll do not count.
     pub offered: u32,
     /// Frames taken by the driver.
     pub sent: u32,

@@ -200,7 +200,7 @@ pub(in crate::runner) struct Pending {
     pub(in crate::runner) yields: Option<u32>,
     /// Frames that found no place wait in the device.
     pub(in crate::runner) waits: bool,
-    /// A frame of others, evicted by a frame that waited. One at a time: none is offered until the next tick.
+    /// A frame of others, evicted by a frame that waited. Polls offer no more frames then, until the next tick.
     pub(in crate::runner) evicted: Option<CanFrame>,
 }
 
@@ -238,7 +238,7 @@ pub(super) struct Unsent {
 }
 
 impl Unsent {
-    /// Tells whether the driver took it in an earlier tick, and it did not come back.
+    /// Tells whether the driver took the frame in an earlier tick, and the frame did not come back.
     const fn stays_sent(&self, now: Instant) -> bool {
         self.is_accepted && self.accepted != now.stamp()
     }
