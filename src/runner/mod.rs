@@ -30,11 +30,11 @@ mod supervision;
 mod tests;
 mod watch;
 
-pub use port::{AbortPending, BlockingTx, Nb, NbAbort, Port};
+pub use port::{BlockingTx, Nb, NbAbort, Port};
 #[cfg(feature = "queue")]
 pub use queue::{FrameQueue, FrameReceiver, FrameSender};
 pub use statistics::{ErrorCounts, Statistics};
-pub use supervision::EmergencyStop;
+pub use supervision::{AbortPending, EmergencyStop};
 pub use watch::BusCondition;
 
 use crate::frame::CanFrame;

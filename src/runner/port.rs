@@ -2,6 +2,7 @@
 
 use super::Statistics;
 use super::statistics::{Meter, increment};
+use super::supervision::AbortPending;
 use super::watch::{Pending, Watch};
 use crate::frame::CanFrame;
 use crate::motor::Devices;
@@ -113,19 +114,6 @@ impl<C: embedded_can::blocking::Can> Driver for BlockingTx<C> {
     }
 }
 
-/// A CAN driver that can abort frames pending in its controller, as bxCAN, FDCAN and MCP2515 allow.
-///
-/// `embedded-can` has no such call. Without it, if the plug is pulled while the motors are driven, a frame with the old
-/// currents stays in each mailbox and leaves when the bus is back. Implement the trait for the newtype around the driver, and
-/// give the runner `NbAbort(Nb(driver))`.
-pub trait AbortPending: embedded_can::nb::Can {
-    /// Aborts the transmission of all pending frames, and hands each aborted frame to `back`. Does not wait.
-    ///
-    /// A frame on the wire at that moment may still arrive; if the controller cannot tell, the frame is handed over too.
-    /// Frames in a queue of the driver count as pending as well.
-    fn abort_pending(&mut self, back: impl FnMut(Self::Frame));
-}
-
 /// A driver that implements [`AbortPending`]: as [`Nb`], and no command older than one period waits in the controller.
 ///
 /// Before each update, every frame not sent since the tick before is called back. Frames of the device are offered again with the
@@ -199,6 +187,9 @@ impl<C: AbortPending> Driver for NbAbort<C> {
 
 /// Upper bound on the frames of one tick, for devices with an endless supply of frames.
 const FRAMES_A_TICK: usize = 64;
+
+/// Frames evicted in a tick, or refused in a poll, that wait for the next poll.
+const MOST_RETURNS: usize = 4;
 
 /// Number of failures in a row after which a frame takes another turn. A driver whose errors alternate with successes
 /// would fail an earlier change as well.
@@ -278,7 +269,8 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
     /// Offers the frames after a frame not simply taken by the driver, and all frames of a tick in which a frame takes
     /// another turn.
     ///
-    /// A frame without a place ends the sending, and is offered again by the next poll or, with new values, first in the next tick.
+    /// A frame without a place ends the sending of a tick, and no poll: a frame of higher priority may find one. This frame and the evicted
+    /// ones are offered again by the next poll, or with new values in the next tick.
     /// A frame that fails again and again takes another turn: the last after the first, otherwise the first. So a driver with one
     /// failing call in each tick, always the first or always the last, keeps no frame from the bus.
     #[cold]
@@ -293,6 +285,7 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
         let yields = if is_later { None } else { self.pending.yields.take() };
         let (mut held, mut goes_first, mut refused) = (None, None, None);
         let mut is_first = sent == 0 && !is_later;
+        let (mut back, mut returns) = ([CanFrame::EMPTY; MOST_RETURNS], 0);
         for _ in sent..FRAMES_A_TICK {
             let (frame, outcome, other) = match offered.take() {
                 Some(offered) => offered,
@@ -316,23 +309,19 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
                 Sent::Accepted => self.note_accepted(&frame),
                 Sent::Evicted => {
                     self.count_sent(&frame);
+                    // An older one of the same id comes back before the frame that took its place.
                     let is_older = other.header() == frame.header();
-                    let waits = !is_older && self.device.put_back(&other);
-                    let is_own = waits || self.device.requeue(&other);
-                    if is_own {
-                        increment(&mut self.statistics.evicted);
-                        self.meter.discount(&other);
-                        // Before the frame that took its place: both may have one id.
-                        self.watch.evicted(other.header(), self.now);
-                    } else {
-                        increment(&mut self.statistics.evicted_unrelated);
-                        evicted(&other);
+                    match back.get_mut(returns).filter(|_| !is_later && !is_older) {
+                        Some(place) => {
+                            *place = other;
+                            returns += 1;
+                        }
+                        None => self.take_back(&other, !is_older, evicted),
                     }
                     if !is_older {
                         self.watch.accepted(frame.header(), self.now);
                     }
-                    self.pending.waits |= waits;
-                    if waits || is_later && !is_own {
+                    if is_later {
                         break;
                     }
                 }
@@ -342,14 +331,17 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
                     self.watch.accepted(frame.header(), self.now);
                 }
                 Sent::Full => {
+                    self.pending.waits = true;
+                    if let Some(place) = back.get_mut(returns).filter(|_| is_later) {
+                        *place = frame;
+                        returns += 1;
+                        continue;
+                    }
                     if !is_later {
                         increment(&mut self.statistics.refused);
                         self.watch.refused(frame.header(), self.now);
                     }
-                    self.pending.waits = true;
-                    if !self.device.put_back(&frame) {
-                        refused = Some(frame);
-                    }
+                    refused = Some(frame).filter(|frame| !self.device.put_back(frame));
                     break;
                 }
                 Sent::Failed(kind) => {
@@ -367,9 +359,30 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
             }
             is_first = false;
         }
+        for frame in back.iter().take(returns) {
+            if !is_later {
+                self.take_back(frame, true, evicted);
+            } else if !self.device.put_back(frame) {
+                self.device.requeue(frame);
+            }
+        }
         // The frame given back last goes first.
         for frame in [held, goes_first, refused].into_iter().flatten() {
             self.device.requeue(&frame);
+        }
+    }
+
+    /// Gives an evicted frame back to its device, where the frame may wait for the next poll, or to `evicted`.
+    fn take_back(&mut self, other: &CanFrame, waits: bool, evicted: &mut dyn FnMut(&CanFrame)) {
+        let waits = waits && self.device.put_back(other);
+        self.pending.waits |= waits;
+        if waits || self.device.requeue(other) {
+            increment(&mut self.statistics.evicted);
+            self.meter.discount(other);
+            self.watch.evicted(other.header(), self.now);
+        } else {
+            increment(&mut self.statistics.evicted_unrelated);
+            evicted(other);
         }
     }
 

@@ -1,4 +1,4 @@
-//! Supervision of a runner: its settings, arming, the counters and conditions, and the emergency stop.
+//! Supervision of a runner: its settings, arming, the counters and conditions, the emergency stop, and the abort of pending frames.
 
 use super::{BusCondition, Port, Runner, Statistics};
 use crate::motor::{ArmError, Ask, BusLoad, Devices};
@@ -259,6 +259,19 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     pub const fn heartbeat(&self) -> u32 {
         self.watch.heartbeat
     }
+}
+
+/// A CAN driver that can abort frames pending in its controller, as bxCAN, FDCAN and MCP2515 allow.
+///
+/// `embedded-can` has no such call. Without it, if the plug is pulled while the motors are driven, a frame with the old
+/// currents stays in each mailbox and leaves when the bus is back. Implement the trait for the newtype around the driver, and
+/// give the runner `NbAbort(Nb(driver))`.
+pub trait AbortPending: embedded_can::nb::Can {
+    /// Aborts the transmission of all pending frames, and hands each aborted frame to `back`. Does not wait.
+    ///
+    /// A frame on the wire at that moment may still arrive; if the controller cannot tell, the frame is handed over too.
+    /// Frames in a queue of the driver count as pending as well.
+    fn abort_pending(&mut self, back: impl FnMut(Self::Frame));
 }
 
 /// An emergency stop that any context can set: put it into a `static` and set it from an interrupt.
