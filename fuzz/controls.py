@@ -67,7 +67,7 @@ DEFECTS = [
     ("ingest", "a stall is a pause", "src/motor/safety/device.rs",
      "step_us.min(Self::LONGEST_STEP_US)", "step_us"),
     ("runner", "an evicted frame is not given back", "src/runner/port.rs",
-     "if waits || self.device.requeue(other) {", "if waits || other.header() < 0x300 {"),
+     "if waits || self.device.requeue(&other) {", "if waits || other.header() < 0x300 {"),
     ("runner", "a full driver is not counted", "src/runner/port.rs",
      "increment(&mut self.statistics.refused);", ""),
     ("runner", "errors do not count against the budget", "src/runner/mod.rs",

@@ -335,7 +335,7 @@ impl Outbox {
     /// superseded.
     pub(super) fn put_back(&mut self, header: u32) -> bool {
         match CommandFrame::with_id(header) {
-            Some(frame) if self.ever_used & frame.bit() != 0 => {
+            Some(frame) if self.in_use & frame.bit() != 0 => {
                 let [dirty, _] = self.waiting.0;
                 self.superseded = self.superseded.wrapping_add(ones(dirty & frame.bit()));
                 self.waiting.0 = [dirty | frame.bit(), frame.bit().wrapping_neg()];

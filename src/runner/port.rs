@@ -66,7 +66,6 @@ pub struct Nb<C>(pub C);
 impl<C: embedded_can::nb::Can> Port for Nb<C> {}
 
 impl<C: embedded_can::nb::Can> Driver for Nb<C> {
-    // The length of the frame is known at its origin: no loop copies its bytes then.
     #[inline(always)]
     fn try_send(&mut self, frame: &CanFrame, evicted: &mut CanFrame) -> Sent {
         let Some(frame) = frame.convert() else { return Sent::Failed(ErrorKind::Form) };
@@ -256,7 +255,6 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
         }
     }
 
-    /// Offers the frames of the tick before that found no place.
     #[cold]
     #[inline(never)]
     pub(super) fn send_later(mut self) {
@@ -269,8 +267,7 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
     /// Offers the frames after a frame not simply taken by the driver, and all frames of a tick in which a frame takes
     /// another turn.
     ///
-    /// A frame without a place ends the sending of a tick, and no poll: a frame of higher priority may find one. This frame and the evicted
-    /// ones are offered again by the next poll, or with new values in the next tick.
+    /// A frame without a place ends a tick, and no poll. This frame and the evicted ones are offered again by the next poll.
     /// A frame that fails again and again takes another turn: the last after the first, otherwise the first. So a driver with one
     /// failing call in each tick, always the first or always the last, keeps no frame from the bus.
     #[cold]
@@ -285,6 +282,7 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
         let yields = if is_later { None } else { self.pending.yields.take() };
         let (mut held, mut goes_first, mut refused) = (None, None, None);
         let mut is_first = sent == 0 && !is_later;
+        let (mut ids, mut evictions) = ([0; MOST_RETURNS], 0);
         let (mut back, mut returns) = ([CanFrame::EMPTY; MOST_RETURNS], 0);
         for _ in sent..FRAMES_A_TICK {
             let (frame, outcome, other) = match offered.take() {
@@ -293,6 +291,16 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
                     let frame = match self.device.next_frame(self.turn) {
                         Some(frame) if yields == Some(frame.header()) && held.is_none() => {
                             held = Some(frame);
+                            continue;
+                        }
+                        Some(frame)
+                            if ids.iter().take(evictions).any(|id| *id == frame.header()) =>
+                        {
+                            match back.get_mut(returns) {
+                                Some(place) => *place = frame,
+                                None => _ = self.device.requeue(&frame),
+                            }
+                            returns += 1;
                             continue;
                         }
                         Some(frame) => frame,
@@ -309,17 +317,25 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
                 Sent::Accepted => self.note_accepted(&frame),
                 Sent::Evicted => {
                     self.count_sent(&frame);
-                    // An older one of the same id comes back before the frame that took its place.
                     let is_older = other.header() == frame.header();
-                    match back.get_mut(returns).filter(|_| !is_later && !is_older) {
-                        Some(place) => {
-                            *place = other;
-                            returns += 1;
-                        }
-                        None => self.take_back(&other, !is_older, evicted),
+                    let place = ids.get_mut(evictions).filter(|_| !is_older);
+                    let waits = place.is_some() && self.device.put_back(&other);
+                    if waits || self.device.requeue(&other) {
+                        increment(&mut self.statistics.evicted);
+                        self.meter.discount(&other);
+                        // Before the frame that took its place: both may have one id.
+                        self.watch.evicted(other.header(), self.now);
+                    } else {
+                        increment(&mut self.statistics.evicted_unrelated);
+                        evicted(&other);
                     }
                     if !is_older {
                         self.watch.accepted(frame.header(), self.now);
+                    }
+                    if let Some(place) = place.filter(|_| waits) {
+                        *place = other.header();
+                        evictions += 1;
+                        self.pending.waits = true;
                     }
                     if is_later {
                         break;
@@ -360,29 +376,13 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
             is_first = false;
         }
         for frame in back.iter().take(returns) {
-            if !is_later {
-                self.take_back(frame, true, evicted);
-            } else if !self.device.put_back(frame) {
+            if !self.device.put_back(frame) {
                 self.device.requeue(frame);
             }
         }
         // The frame given back last goes first.
         for frame in [held, goes_first, refused].into_iter().flatten() {
             self.device.requeue(&frame);
-        }
-    }
-
-    /// Gives an evicted frame back to its device, where the frame may wait for the next poll, or to `evicted`.
-    fn take_back(&mut self, other: &CanFrame, waits: bool, evicted: &mut dyn FnMut(&CanFrame)) {
-        let waits = waits && self.device.put_back(other);
-        self.pending.waits |= waits;
-        if waits || self.device.requeue(other) {
-            increment(&mut self.statistics.evicted);
-            self.meter.discount(other);
-            self.watch.evicted(other.header(), self.now);
-        } else {
-            increment(&mut self.statistics.evicted_unrelated);
-            evicted(other);
         }
     }
 
