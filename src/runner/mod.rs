@@ -157,7 +157,9 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         // Frames since the last reading.
         let waited = frames.checked_sub(1).map_or(0, |before| before % FRAMES_A_READING + 1);
         self.watch.standstill.receive(waited);
-        self.send_waiting();
+        if self.pending.waits {
+            self.send_waiting();
+        }
         frames + foreign
     }
 
@@ -217,7 +219,9 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         }
         self.enter(frames, &tally);
         self.watch.standstill.receive(frames);
-        self.send_waiting();
+        if self.pending.waits {
+            self.send_waiting();
+        }
         frames
     }
 
@@ -360,13 +364,6 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     }
 
     /// The parts that sending needs.
-    fn send_waiting(&mut self) {
-        if self.pending.waits {
-            let now = self.read_clock();
-            self.sending(now).send_later();
-        }
-    }
-
     #[inline(always)]
     const fn sending(&mut self, now: Instant) -> Sending<'_, P, D> {
         let Self { port, device, statistics, meter, watch, pending, turn, .. } = self;

@@ -255,8 +255,6 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
         }
     }
 
-    #[cold]
-    #[inline(never)]
     pub(super) fn send_later(mut self) {
         let mut other = None;
         self.pending.waits = false;
@@ -380,6 +378,7 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
                 self.device.requeue(frame);
             }
         }
+        self.pending.was_armed = self.device.is_armed();
         // The frame given back last goes first.
         for frame in [held, goes_first, refused].into_iter().flatten() {
             self.device.requeue(&frame);

@@ -110,6 +110,19 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         }
     }
 
+    /// Offers the frames of the last tick that found no place: within its period, and unless something was stopped since.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn send_waiting(&mut self) {
+        let now = self.read_clock();
+        let is_fresh = |ticked| ticked <= now && now.since(ticked) < self.ticker.period();
+        let is_stopped = self.stop.is_some_and(EmergencyStop::is_set)
+            || self.pending.was_armed && !self.device.is_armed();
+        if self.watch.ticked().is_some_and(is_fresh) && !is_stopped {
+            self.sending(now).send_later();
+        }
+    }
+
     /// Counts received frames lost before this call, for example in a queue of the application. 0 changes nothing.
     pub fn note_lost(&mut self, frames: u32) {
         if frames > 0 {

@@ -29,16 +29,26 @@ fn a_frame_without_a_place_is_offered_by_each_poll_until_sent() {
 }
 
 #[test]
-fn a_frame_that_waits_is_at_rest_after_a_stop() {
-    let clock = ManualClock::new(Instant::from_micros(1_000));
-    let (mut runner, wheels) = driving(&clock);
-    set(&mut runner, wheels, 2);
-    tick_with_one_place(&mut runner, &clock);
-    runner.device_mut().emergency_stop();
-    runner.poll(8);
-    let mut sent = offered(&mut runner);
-    sent.sort_unstable();
-    assert_eq!(sent, [(0x1FF, 0), (0x200, 0)]);
+fn a_poll_offers_nothing_after_a_stop_and_after_the_period() {
+    static STOP: EmergencyStop = EmergencyStop::new();
+    let stops: [fn(&mut TestRunner<'_>, &ManualClock); 4] = [
+        |runner, _| runner.device_mut().emergency_stop(),
+        |runner, _| runner.device_mut().disarm(),
+        |_, _| STOP.set(),
+        |_, clock| clock.advance(Duration::from_micros(900)),
+    ];
+    for stop in stops {
+        let clock = ManualClock::new(Instant::from_micros(1_000));
+        let (runner, wheels) = driving(&clock);
+        let mut runner = runner.with_emergency_stop(&STOP);
+        set(&mut runner, wheels, 2);
+        tick_with_one_place(&mut runner, &clock);
+        clock.advance(Duration::from_micros(100));
+        stop(&mut runner, &clock);
+        runner.poll(8);
+        assert_eq!(offered(&mut runner), []);
+        STOP.clear();
+    }
 }
 
 #[test]

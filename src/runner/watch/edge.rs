@@ -200,12 +200,15 @@ pub(in crate::runner) struct Pending {
     pub(in crate::runner) yields: Option<u32>,
     /// Frames that found no place wait in the device.
     pub(in crate::runner) waits: bool,
+    /// The device was armed in the tick.
+    pub(in crate::runner) was_armed: bool,
     /// A frame of others, evicted by a frame that waited. Polls offer no more frames then, until the next tick.
     pub(in crate::runner) evicted: Option<CanFrame>,
 }
 
 impl Pending {
-    pub(in crate::runner) const NONE: Self = Self { yields: None, waits: false, evicted: None };
+    pub(in crate::runner) const NONE: Self =
+        Self { yields: None, waits: false, was_armed: false, evicted: None };
 
     /// Begins a tick, whose update replaces the frames that wait.
     #[inline]
