@@ -300,8 +300,8 @@ impl Pid {
     ///
     /// The setpoint of the last step is `measurement + error`, so only its rate has to be stored.
     fn follow(&mut self, error: f32, measured: f32, step: &TimeStep) -> f32 {
-        let (r, is_known) = (-self.way, self.measurement != UNKNOWN);
-        let rate = if is_known { self.tracking_rate } else { 0.0 };
+        let (r, rate) = (-self.way, self.tracking_rate);
+        let is_known = self.measurement != UNKNOWN;
         let last = if is_known { self.core.error - (measured - self.measurement) } else { 0.0 };
         let (longest_s, pull) = (1.0 / r, r * (last - error) + 2.0 * rate);
         let dt_s = if step.dt_s > longest_s { longest_s } else { step.dt_s };
