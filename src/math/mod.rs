@@ -278,7 +278,13 @@ pub(crate) const fn shortest(x: f32, period: f32) -> f32 {
     if rest.abs() < half {
         return rest;
     }
-    // At the half turn itself, or rounded to the wrong side of it.
+    folded(rest, half, period)
+}
+
+/// Returns a rest at the half turn itself, or rounded to the wrong side of it, on the right side; zero where the argument held no
+/// remainder any more.
+#[inline]
+const fn folded(rest: f32, half: f32, period: f32) -> f32 {
     let near = if rest >= half {
         rest - period
     } else if rest < -half {
@@ -319,15 +325,7 @@ const fn at_the_edge(rest: f32, x: f32) -> f32 {
     if !x.is_finite() {
         return f32::NAN;
     }
-    let near = if rest >= PI {
-        rest - TAU
-    } else if rest < -PI {
-        rest + TAU
-    } else {
-        rest
-    };
-    // Here `x` holds no remainder any more: the spacing of f32 is more than a turn.
-    if near >= -PI && near < PI { near } else { 0.0 }
+    folded(rest, PI, TAU)
 }
 
 /// [`wrap`] by long division of the significands, in digits of 8 bits.
