@@ -118,7 +118,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
 
     /// Takes at most `budget` received frames from the driver; frames of others are dropped. Returns how many came.
     ///
-    /// Costs 557 instructions on a Cortex-M4F, for 8 frames of motors (`docs/figures.md`).
+    /// Costs 553 instructions on a Cortex-M4F, for 8 frames of motors (`docs/figures.md`).
     pub fn poll(&mut self, budget: usize) -> usize {
         self.poll_with(budget, |_| {})
     }

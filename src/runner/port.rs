@@ -280,25 +280,17 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
         let yields = if is_later { None } else { self.pending.yields.take() };
         let (mut held, mut goes_first, mut refused) = (None, None, None);
         let mut is_first = sent == 0 && !is_later;
-        let (mut ids, mut evictions) = ([0; MOST_RETURNS], 0);
+        // Evicted by this call, and not offered again by it.
+        let (mut ids, mut evictions) = ([u32::MAX; MOST_RETURNS], 0);
         let (mut back, mut returns) = ([CanFrame::EMPTY; MOST_RETURNS], 0);
         for _ in sent..FRAMES_A_TICK {
+            let mut comes_again = false;
             let (frame, outcome, other) = match offered.take() {
                 Some(offered) => offered,
                 None => {
                     let frame = match self.device.next_frame(self.turn) {
                         Some(frame) if yields == Some(frame.header()) && held.is_none() => {
                             held = Some(frame);
-                            continue;
-                        }
-                        Some(frame)
-                            if ids.iter().take(evictions).any(|id| *id == frame.header()) =>
-                        {
-                            match back.get_mut(returns) {
-                                Some(place) => *place = frame,
-                                None => _ = self.device.requeue(&frame),
-                            }
-                            returns += 1;
                             continue;
                         }
                         Some(frame) => frame,
@@ -308,7 +300,12 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
                         },
                     };
                     let mut other = CanFrame::EMPTY;
-                    (frame, self.port.try_send(&frame, &mut other), other)
+                    comes_again = ids.contains(&frame.header());
+                    let outcome = match comes_again {
+                        true => Sent::Full,
+                        false => self.port.try_send(&frame, &mut other),
+                    };
+                    (frame, outcome, other)
                 }
             };
             match outcome {
@@ -346,12 +343,13 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
                 }
                 Sent::Full => {
                     self.pending.waits = true;
-                    if let Some(place) = back.get_mut(returns).filter(|_| is_later) {
-                        *place = frame;
-                        returns += 1;
-                        continue;
-                    }
-                    if !is_later {
+                    if is_later || comes_again {
+                        if let Some(place) = back.get_mut(returns) {
+                            *place = frame;
+                            returns += 1;
+                            continue;
+                        }
+                    } else {
                         increment(&mut self.statistics.refused);
                         self.watch.refused(frame.header(), self.now);
                     }

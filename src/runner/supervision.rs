@@ -118,7 +118,8 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         let is_fresh = |ticked| ticked <= now && now.since(ticked) < self.ticker.period();
         let is_stopped = self.stop.is_some_and(EmergencyStop::is_set)
             || self.pending.was_armed && !self.device.is_armed();
-        if self.watch.ticked().is_some_and(is_fresh) && !is_stopped {
+        let has_place = self.pending.evicted.is_none();
+        if has_place && self.watch.ticked().is_some_and(is_fresh) && !is_stopped {
             self.sending(now).send_later();
         }
     }

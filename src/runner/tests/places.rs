@@ -68,3 +68,26 @@ fn a_frame_of_others_evicted_by_a_poll_is_handed_back_by_the_next_tick() {
     runner.tick_with(Tick::new(clock.now(), 0.001), |frame| handed_back.push(*frame));
     assert_eq!((handed_back, runner.statistics().evicted_unrelated), (vec![foreign], 1));
 }
+
+#[test]
+fn a_frame_of_others_evicted_after_one_without_a_place_is_not_lost() {
+    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let (mut runner, wheels) = driving(&clock);
+    let foreign = frame(0x7FF, [9; 8]);
+    clock.advance(Duration::from_millis(1));
+    hear(&mut runner, &clock);
+    set(&mut runner, wheels, 2);
+    runner.port_mut().0.transmit.push_back(Err(nb::Error::WouldBlock));
+    runner.tick(Tick::new(clock.now(), 0.001));
+    let full = Err(nb::Error::WouldBlock);
+    runner.port_mut().0.transmit.extend([full, Ok(Some(foreign))]);
+    for offers in [2, 0] {
+        _ = offered(&mut runner);
+        runner.poll(8);
+        assert_eq!(offered(&mut runner).len(), offers);
+    }
+    let mut handed_back = Vec::new();
+    clock.advance(Duration::from_millis(1));
+    runner.tick_with(Tick::new(clock.now(), 0.001), |frame| handed_back.push(*frame));
+    assert_eq!(handed_back, [foreign]);
+}
