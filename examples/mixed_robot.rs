@@ -1,7 +1,7 @@
 //! A robot of three families on two CAN buses: four M3508 wheels on the first, a Damiao pitch joint and a VESC shooter on the second.
 //!
-//! Each bus has one runner. The device of the second is a tuple of two motors, each of its own family: they are armed, stopped and
-//! watched together, and driven one by one. The robot drives and spins its shooter up; at 2.5 s the VESC reports a fault. The shooter
+//! Each bus has one runner. The device of the second is a tuple of two motors, each of its own family. Both motors are armed, stopped
+//! and watched together, and driven one by one. The robot drives and spins its shooter up; at 2.5 s the VESC reports a fault. The shooter
 //! trips, the joint holds its angle and the wheels go on. The operator arms again, and at the end presses the emergency stop.
 //! The drives are those of the simulator. `cargo run --release --example mixed_robot`
 
@@ -84,7 +84,7 @@ fn turret() -> Result<Turret, Box<dyn Error>> {
     Ok((Own::new(pitch), Own::new(vesc::Motor::new(SHOOTER, 23, shooter)?)))
 }
 
-/// Sets the targets of the second bus; they are refused until it is armed, and those of a motor that tripped.
+/// Sets the targets of the second bus. A motor that is not armed, or that tripped, refuses its target.
 fn aim((pitch, shooter): &mut Turret) {
     _ = pitch.set_impedance(Impedance {
         angle: PITCH,
@@ -158,7 +158,7 @@ fn body(world: &Simulation) -> Result<[MotorKey; 4], Box<dyn Error>> {
     Ok(keys)
 }
 
-/// What is asserted at the end.
+/// The observations asserted at the end.
 #[derive(Debug, Default)]
 struct Seen {
     /// The largest errors, after each had time to settle.

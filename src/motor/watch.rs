@@ -88,7 +88,7 @@ impl Watch {
         self.monitor = Monitor::NEW;
     }
 
-    /// Checks the motor, relaxes it where a condition asks for it, and returns the share of the output that is left.
+    /// Checks the motor, relaxes the motor where a condition demands rest, and returns the remaining share of the output.
     #[inline]
     pub(crate) fn check(
         &mut self,

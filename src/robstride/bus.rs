@@ -177,7 +177,7 @@ impl Motor {
         }
     }
 
-    /// Tells whether a value in the drive is right. Of the time-out any value is right: the configured value is written later.
+    /// Tells whether a value in the drive is right. Every finite time-out is right: the configured value is written later.
     fn is_right(&self, register: Register, found: f32) -> bool {
         match register {
             Register::RunMode => found.to_bits() == self.expected(register).to_bits(),

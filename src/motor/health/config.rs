@@ -92,8 +92,8 @@ impl HealthConfig {
         self
     }
 
-    /// Sets the temperatures in °C from which the output falls, and at which the output is zero, instead of those of the model. Both
-    /// conditions end 5 K lower. No effect for a motor without a reported temperature.
+    /// Replaces the model's temperatures in °C: the output falls from the first on, and is zero at the second. Both conditions end 5 K
+    /// lower. No effect for a motor without a reported temperature.
     #[must_use]
     pub const fn with_temperatures(self, warning_c: i16, limit_c: i16) -> Self {
         Self { temperatures_c: Some((warning_c, limit_c)), ..self }
