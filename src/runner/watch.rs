@@ -4,8 +4,8 @@ mod edge;
 
 pub use edge::BusCondition;
 
+use crate::frame::CanFrame;
 use crate::time::{Duration, Instant, Tick};
-pub(super) use edge::Pending;
 use edge::{BusEdge, Edges, Unsent, WATCHED_FRAMES};
 
 /// Merges a step that was not run with the next step: no elapsed time is lost, nor a clock that stood or went back.
@@ -144,6 +144,33 @@ impl Watch {
 
     pub(super) fn next_edge(&mut self) -> Option<BusEdge> {
         self.edges.next()
+    }
+}
+
+/// Frames of the last tick that the driver did not take.
+#[derive(Debug)]
+pub(super) struct Pending {
+    /// A frame that failed as the first, and therefore goes last in the next tick.
+    pub(super) yields: Option<u32>,
+    /// Frames that found no place wait in the device.
+    pub(super) waits: bool,
+    /// The device was armed in the tick.
+    pub(super) was_armed: bool,
+    /// A frame of others, evicted by a frame that waited. Polls offer no more frames then, until the next tick.
+    pub(super) evicted: Option<CanFrame>,
+}
+
+impl Pending {
+    pub(super) const NONE: Self =
+        Self { yields: None, waits: false, was_armed: false, evicted: None };
+
+    /// Begins a tick, whose update replaces the frames that wait.
+    #[inline]
+    pub(super) fn hand_over(&mut self, evicted: &mut impl FnMut(&CanFrame)) {
+        self.waits = false;
+        if let Some(frame) = self.evicted.take() {
+            evicted(&frame);
+        }
     }
 }
 

@@ -2,7 +2,6 @@
 //! driver: the time that each has waited.
 
 use super::{BUS_LOST_AFTER, Watch};
-use crate::frame::CanFrame;
 use crate::motor::take_age;
 use crate::time::{ConditionEdge, Duration, Instant};
 
@@ -192,33 +191,6 @@ impl Latch {
 /// A frame that the device no longer offers is forgotten: after this time, or after this number of ticks, in which each of many
 /// devices has its turn. A frame sent seldom, such as the limits of a drive, may be refused once.
 const FORGOTTEN_AFTER: (Duration, u8) = (Duration::from_secs(1), 32);
-
-/// Frames of the last tick that the driver did not take.
-#[derive(Debug)]
-pub(in crate::runner) struct Pending {
-    /// A frame that failed as the first, and therefore goes last in the next tick.
-    pub(in crate::runner) yields: Option<u32>,
-    /// Frames that found no place wait in the device.
-    pub(in crate::runner) waits: bool,
-    /// The device was armed in the tick.
-    pub(in crate::runner) was_armed: bool,
-    /// A frame of others, evicted by a frame that waited. Polls offer no more frames then, until the next tick.
-    pub(in crate::runner) evicted: Option<CanFrame>,
-}
-
-impl Pending {
-    pub(in crate::runner) const NONE: Self =
-        Self { yields: None, waits: false, was_armed: false, evicted: None };
-
-    /// Begins a tick, whose update replaces the frames that wait.
-    #[inline]
-    pub(in crate::runner) fn hand_over(&mut self, evicted: &mut impl FnMut(&CanFrame)) {
-        self.waits = false;
-        if let Some(frame) = self.evicted.take() {
-            evicted(&frame);
-        }
-    }
-}
 
 /// How many frames can wait at a time and be watched each: the five of a DJI bus, and own ones.
 pub(super) const WATCHED_FRAMES: usize = 8;
