@@ -47,7 +47,6 @@ const SHOOTER: vesc::Model = vesc::Model {
     torque_constant_nm_per_a: 0.035,
     current_limit_a: 30.0,
     max_velocity: AngularVelocity::from_rpm(6_000.0),
-    is_reversed: false,
 };
 /// Nm per rad/s and Nm per rad, for 0.001 kg m².
 const SPIN: PidConfig = PidConfig::new(0.03, 0.1, 0.0);

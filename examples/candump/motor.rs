@@ -247,7 +247,6 @@ pub(crate) fn listener(spec: Spec) -> Result<Box<dyn Listener>, String> {
                 torque_constant_nm_per_a: 1.0,
                 current_limit_a: 1.0,
                 max_velocity: any_speed,
-                is_reversed: false,
             };
             let motor = vesc::Motor::new(model, id, vesc::Mode::velocity()).map_err(text)?;
             Ok(Box::new(Vesc(Own::new(motor))))

@@ -143,7 +143,6 @@ fn vesc_of(kind: u8, input: &mut Input) {
         torque_constant_nm_per_a: 0.05,
         current_limit_a: 20.0,
         max_velocity: AngularVelocity::from_rad_per_s(300.0),
-        is_reversed: false,
     };
     fn bench(mode: vesc::Mode, limits: Limits, input: &mut Input) {
         let motor = VescMotor {

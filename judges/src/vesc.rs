@@ -31,7 +31,6 @@ const MODEL: Model = Model {
     torque_constant_nm_per_a: 0.05,
     current_limit_a: 40.0,
     max_velocity: AngularVelocity::from_rad_per_s(300.0),
-    is_reversed: false,
 };
 
 pub fn run(arguments: &[&str], mut input: impl BufRead, output: &mut impl Write) -> Outcome<()> {

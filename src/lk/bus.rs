@@ -52,7 +52,6 @@ const ECHOES: u8 = 3;
 pub struct Motor {
     model: Model,
     id: u8,
-    is_reversed: bool,
     mode: Mode,
     /// The last feedback; `None` before the first.
     drive: Option<Feedback>,
@@ -86,7 +85,6 @@ impl Motor {
         Ok(Self {
             model,
             id,
-            is_reversed: false,
             mode,
             drive: None,
             rotor: 0,
@@ -101,13 +99,7 @@ impl Motor {
         })
     }
 
-    /// Turns the positive direction round: angle, velocity and torque.
-    #[must_use]
-    pub const fn reversed(self) -> Self {
-        Self { is_reversed: !self.is_reversed, ..self }
-    }
-
-    /// Returns the last feedback of the drive, in the units and the direction of the drive; `None` before the first.
+    /// Returns the last feedback of the drive, in the units of the drive; `None` before the first.
     #[must_use]
     pub const fn feedback(&self) -> Option<&Feedback> {
         self.drive.as_ref()
@@ -123,11 +115,6 @@ impl Motor {
         CanFrame::of(id_of(FRAMES, self.id), command.encode())
     }
 
-    /// Returns a value of the output shaft in the direction of the drive, or the other way round.
-    const fn turned(&self, value: f32) -> f32 {
-        if self.is_reversed { -value } else { value }
-    }
-
     /// Returns the angle of the rotor in 0.01°, with turns.
     const fn rotor_angle(&self) -> i64 {
         (self.rotor * TURN) >> 16
@@ -138,14 +125,12 @@ impl Motor {
         let to_rotor = 100.0 * self.model.gear() / RAD_PER_DEGREE;
         match goal {
             Goal::Torque(torque_nm) => {
-                let counts = self.turned(torque_nm) / self.model.torque_per_count();
+                let counts = torque_nm / self.model.torque_per_count();
                 Some(Command::Torque(i16::try_from(whole(counts)).ok()?))
             }
-            Goal::Velocity(velocity) => {
-                Some(Command::Velocity(whole(self.turned(velocity) * to_rotor), limit))
-            }
+            Goal::Velocity(velocity) => Some(Command::Velocity(whole(velocity * to_rotor), limit)),
             Goal::Way(way) => {
-                let way = i64::from(whole(self.turned(way) * to_rotor));
+                let way = i64::from(whole(way * to_rotor));
                 let angle = self.ahead? + self.rotor_angle() + way;
                 Some(Command::Position(i32::try_from(angle).ok()?, limit))
             }
@@ -214,13 +199,13 @@ impl OwnMotor for Motor {
 
     fn velocity(&self) -> AngularVelocity {
         let velocity = self.drive.map_or(0.0, |drive| drive.velocity_rad_per_s(&self.model));
-        AngularVelocity::from_rad_per_s(self.turned(velocity))
+        AngularVelocity::from_rad_per_s(velocity)
     }
 
     /// Turns of the output shaft count.
     fn angle(&self) -> Option<Angle> {
         self.drive?;
-        Some(Angle::from_turns(self.turned(self.rotor as f32 / 65_536.0 / self.model.gear())))
+        Some(Angle::from_turns(self.rotor as f32 / 65_536.0 / self.model.gear()))
     }
 
     fn rest(&mut self) -> CanFrame {
@@ -341,7 +326,7 @@ impl OwnMotor for Motor {
             temperature_c: Some(drive.temperature_c.into()),
             effort: self.mode.0.effort(),
             speed: self.model.speed_share(self.velocity().as_rad_per_s()),
-            current: self.turned(f32::from(drive.current) / MOST_COUNTS),
+            current: f32::from(drive.current) / MOST_COUNTS,
             ..Vitals::of_errors([errors], 0)
         }
     }

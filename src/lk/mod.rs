@@ -73,7 +73,7 @@
 //! Sources: "Motor CAN bus communication protocol" V2.35 of the vendor, as quoted by public programs: frames, ids, scales, effects of
 //! off and run, two of the error bits. The other six bits, and the current limit in bytes 2 and 3 of 0xA2, as pylkmotor 1.0.6 has
 //! them; with V2.35 these two bytes are 0. Not known: the side from which the manual sees its positive direction, called clockwise
-//! there: angles and torques have the sign of the drive, and [`Motor::reversed`] reverses both. Whether a drive counts turns while
+//! there: angles and torques have the sign of the drive, and [`Own::reversed`](crate::motor::Own::reversed) reverses both. Whether a drive counts turns while
 //! off.
 
 pub(crate) mod bus;

@@ -99,13 +99,7 @@ impl Motor {
     /// [`ConfigError::Range`] for a ratio not between 0.001 and 100000.
     pub fn with_gear(self, ratio: f32) -> Result<Self, ConfigError> {
         ConfigError::check_range("gear ratio", ratio, 0.001, 100_000.0)?;
-        Ok(Self { gear: ratio.copysign(self.gear), ..self })
-    }
-
-    /// Has the output shaft turn clockwise when the position of the drive rises.
-    #[must_use]
-    pub fn reversed(self) -> Self {
-        Self { gear: -self.gear, ..self }
+        Ok(Self { gear: ratio, ..self })
     }
 
     /// Has the drive's modes read back, and then its watchdog set, each time before the drive is enabled: 0.6 only. The drive disarms

@@ -29,24 +29,17 @@ impl Motor {
         CanFrame::of(id_of(IDS.0, self.id), command.encode())
     }
 
-    /// Turns a value of the output shaft to the direction of the drive, or back.
-    const fn turned(&self, value: f32) -> f32 {
-        if self.is_reversed { -value } else { value }
-    }
-
     /// Returns the command for a goal with a limit; `None` if the protocol has no such command.
     fn command(&self, goal: Goal, limit: u16) -> Option<Command> {
         let counts = 100.0 / RAD_PER_DEGREE;
         match goal {
             Goal::Torque(torque_nm) => {
-                let counts = self.turned(torque_nm) / self.model.scale().torque_per_count;
+                let counts = torque_nm / self.model.scale().torque_per_count;
                 Some(Command::Torque(i16::try_from(whole(counts)).ok()?))
             }
-            Goal::Velocity(velocity) => {
-                Some(Command::Velocity(whole(self.turned(velocity) * counts)))
-            }
+            Goal::Velocity(velocity) => Some(Command::Velocity(whole(velocity * counts))),
             Goal::Way(way) => {
-                let angle = self.track?.counts() + i64::from(whole(self.turned(way) * counts));
+                let angle = self.track?.counts() + i64::from(whole(way * counts));
                 Some(Command::Position(i32::try_from(angle).ok()?, limit))
             }
             Goal::Impedance(_) => None,
@@ -122,12 +115,12 @@ impl OwnMotor for Motor {
 
     fn velocity(&self) -> AngularVelocity {
         let velocity = self.drive.map_or(0.0, |drive| f32::from(drive.velocity_dps));
-        AngularVelocity::from_rad_per_s(self.turned(velocity * RAD_PER_DEGREE))
+        AngularVelocity::from_rad_per_s(velocity * RAD_PER_DEGREE)
     }
 
     /// Turns of the output shaft count, from the zero of the drive.
     fn angle(&self) -> Option<Angle> {
-        Some(Angle::from_turns(self.turned(self.track?.turns())))
+        Some(Angle::from_turns(self.track?.turns()))
     }
 
     fn rest(&mut self) -> CanFrame {
@@ -284,7 +277,7 @@ impl OwnMotor for Motor {
             temperature_c: Some(drive.temperature_c.into()),
             effort: self.mode.0.effort(),
             speed: if supply_v > 0.0 { speed / supply_v } else { 0.0 },
-            current: self.turned(current / self.model.max_current_a()),
+            current: current / self.model.max_current_a(),
             ..Vitals::of_errors([lowest_bit(errors.into())], 0)
         }
     }

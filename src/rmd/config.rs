@@ -32,7 +32,6 @@ const TIMEOUT_MS: u32 = 100;
 pub struct Motor {
     pub(super) model: Model,
     pub(super) id: u8,
-    pub(super) is_reversed: bool,
     pub(super) mode: Mode,
     /// In ms; `None` to leave the drive's as it is.
     pub(super) timeout: Option<u32>,
@@ -69,7 +68,6 @@ impl Motor {
         Ok(Self {
             model,
             id,
-            is_reversed: false,
             mode,
             timeout: Some(TIMEOUT_MS),
             timeout_found: None,
@@ -88,12 +86,6 @@ impl Motor {
         })
     }
 
-    /// Turns the positive direction round: angle, velocity and torque.
-    #[must_use]
-    pub const fn reversed(self) -> Self {
-        Self { is_reversed: !self.is_reversed, ..self }
-    }
-
     /// Sets the time without a frame after which the drive switches itself off and locks its brake: 10 ms to 60 s, 100 ms at first.
     ///
     /// # Errors
@@ -110,7 +102,7 @@ impl Motor {
         Self { timeout: None, ..self }
     }
 
-    /// Returns the last feedback of the drive, in the units and the direction of the drive; `None` before the first.
+    /// Returns the last feedback of the drive, in the units of the drive; `None` before the first.
     #[must_use]
     pub const fn feedback(&self) -> Option<&Feedback> {
         self.drive.as_ref()

@@ -81,7 +81,7 @@
 //! request 4 of `myactuator_rmd_ros`. The table of the models: see [`Model`].
 //!
 //! Not known: the side from which the manual sees its positive direction: angles and torques have the sign of the drive, and
-//! [`Motor::reversed`] reverses both. Whether off locks the holding brake. Whether a drive goes on with its last command when frames
+//! [`Own::reversed`](crate::motor::Own::reversed) reverses both. Whether off locks the holding brake. Whether a drive goes on with its last command when frames
 //! come again after its time-out. If so, the command runs until the second frame of the program arrives: for one update, or for the
 //! whole time-out where only one frame gets through. So a drive that was not heard gets rest or off alone, until its feedback comes.
 //! Whether a drive answers while its brake opens: after 100 ms without an answer the motor trips, and needs longer

@@ -47,7 +47,6 @@ const ORDERS: u8 = 50;
 ///     torque_constant_nm_per_a: 0.5,
 ///     current_limit_a: 20.0,
 ///     max_velocity: AngularVelocity::from_rpm(500.0),
-///     is_reversed: false,
 /// };
 /// let mut wheel = Motor::new(WHEEL, 1, Mode::velocity())?;
 /// assert_eq!(format!("{:?}", wheel.rest()), "00000101 [4] 00 00 00 00"); // current 0
@@ -213,7 +212,7 @@ impl OwnMotor for Motor {
             return self.position().map(encoder::Position::angle);
         }
         let degrees = self.feedback.position_deg.filter(|_| self.has_fresh_angle())?;
-        Some(Angle::from_degrees(self.model.signed(degrees)))
+        Some(Angle::from_degrees(degrees))
     }
 
     fn rest(&mut self) -> CanFrame {
@@ -226,7 +225,7 @@ impl OwnMotor for Motor {
             model: &self.model,
             velocity: self.velocity(),
             angle: self.angle(),
-            duty: self.model.signed(self.feedback.duty.unwrap_or_default()),
+            duty: self.feedback.duty.unwrap_or_default(),
         };
         let command = self.mode.command(order, &at);
         let Some((command, effort)) = command else { return self.rest() };
@@ -291,7 +290,7 @@ impl OwnMotor for Motor {
             (Some(driver), Some(motor)) => Some(whole(driver.max(motor))),
             _ => None,
         };
-        let current = self.model.signed(drive.current_a.unwrap_or_default());
+        let current = drive.current_a.unwrap_or_default();
         let current = current / self.model.current_limit_a;
         Vitals {
             temperature_c: celsius,

@@ -119,7 +119,7 @@ impl DutyControl {
         let wanted = self.speed.step(target.as_rad_per_s(), at.velocity.as_rad_per_s(), &step);
         self.speed.keep_integral_between(lowest, highest);
         let duty = wanted.min(highest).max(lowest);
-        Some((Command::Duty(at.model.signed(duty)), Some(duty / self.limit)))
+        Some((Command::Duty(duty), Some(duty / self.limit)))
     }
 }
 
@@ -254,7 +254,7 @@ fn velocity(standstill: Rest, order: Order, at: &At) -> Option<(Command, Option<
 fn position(order: Order, at: &At) -> Option<(Command, Option<f32>)> {
     let Order { target: Target::Angle(target), .. } = order else { return None };
     at.angle?;
-    let angle = Angle::from_radians(wrap_tau(at.model.signed(target.as_radians())));
+    let angle = Angle::from_radians(wrap_tau(target.as_radians()));
     Some((Command::Position(angle.as_degrees()), None))
 }
 

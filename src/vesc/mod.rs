@@ -62,7 +62,6 @@
 //!     torque_constant_nm_per_a: 0.035, // 9.55 / 270 rpm/V
 //!     current_limit_a: 30.0,
 //!     max_velocity: AngularVelocity::from_rpm(6_000.0),
-//!     is_reversed: false,
 //! };
 //! let mut shooter = Own::new(Motor::new(SHOOTER, 23, Mode::current())?);
 //! let refused = shooter.arm(Instant::from_micros(1_000)).map_err(|error| error.to_string());

@@ -20,7 +20,6 @@ use core::f32::consts::TAU;
 ///     torque_constant_nm_per_a: 0.05,
 ///     current_limit_a: 40.0,
 ///     max_velocity: AngularVelocity::from_rpm(400.0),
-///     is_reversed: false,
 /// };
 /// assert_eq!(joint.torque_limit_nm(), 18.0); // 40 A of 0.05 Nm/A through a gear of 9
 /// assert_eq!(joint.erpm_of(AngularVelocity::from_rpm(100.0)).round(), 6_300.0); // times 9, times 7
@@ -41,8 +40,6 @@ pub struct Model {
     pub current_limit_a: f32,
     /// The velocity of the output shaft without load, above 0: targets are kept within, and health takes it for the whole.
     pub max_velocity: AngularVelocity,
-    /// A positive current turns the output shaft clockwise.
-    pub is_reversed: bool,
 }
 
 impl Model {
@@ -55,23 +52,19 @@ impl Model {
     /// Returns the current in A for a torque of the output shaft in Nm.
     #[must_use]
     pub const fn current_of(&self, torque_nm: f32) -> f32 {
-        self.signed(torque_nm) / (self.torque_constant_nm_per_a * self.gear.as_f32())
+        torque_nm / (self.torque_constant_nm_per_a * self.gear.as_f32())
     }
 
     /// Returns the electrical rpm of a velocity of the output shaft.
     #[must_use]
     pub const fn erpm_of(&self, velocity: AngularVelocity) -> f32 {
-        self.signed(velocity.as_rad_per_s()) * self.electrical() * (60.0 / TAU)
+        velocity.as_rad_per_s() * self.electrical() * (60.0 / TAU)
     }
 
     /// Returns the velocity of the output shaft for electrical rpm.
     #[must_use]
     pub const fn velocity_of(&self, erpm: i32) -> AngularVelocity {
-        AngularVelocity::from_rad_per_s(self.signed(erpm as f32) / self.electrical() * (TAU / 60.0))
-    }
-
-    pub(super) const fn signed(&self, value: f32) -> f32 {
-        if self.is_reversed { -value } else { value }
+        AngularVelocity::from_rad_per_s(erpm as f32 / self.electrical() * (TAU / 60.0))
     }
 
     /// Electrical turns for one turn of the output shaft.
@@ -83,7 +76,6 @@ impl Model {
     pub(super) fn tachometer(&self) -> Tachometer {
         let turn = TACHO * u32::from(self.pole_pairs) * u32::from(self.gear.rotor());
         let output = i32::from(self.gear.output());
-        let output = if self.is_reversed { -output } else { output };
         Tachometer::new(turn.cast_signed(), output)
     }
 

@@ -17,7 +17,6 @@ const MODEL: Model = Model {
     torque_constant_nm_per_a: 0.05,
     current_limit_a: 20.0,
     max_velocity: AngularVelocity::from_rad_per_s(300.0),
-    is_reversed: false,
 };
 
 /// A motor, and a drive whose shaft stands.

@@ -4,6 +4,7 @@
 
 mod drives;
 mod faults;
+mod joint;
 mod load;
 mod motors;
 mod places;

@@ -158,7 +158,6 @@ const VESC: vesc::Model = vesc::Model {
     torque_constant_nm_per_a: 0.05,
     current_limit_a: 20.0,
     max_velocity: AngularVelocity::from_rad_per_s(300.0),
-    is_reversed: false,
 };
 
 const SPEED: PidConfig = PidConfig::new(0.3, 1.0, 0.0);

@@ -3,10 +3,12 @@
 use crate::drives::{raw, with_id};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    ArmError, BusLoad, CanDevice, Claim, Devices, Ingest, Link, Own, OwnMotor, TargetError,
+    AngleDrive, ArmError, BusLoad, CanDevice, Capability, Claim, Devices, Ingest, Link, Own,
+    OwnMotor, TargetError, VelocityDrive,
 };
 use drivetrain::sim::DriveShaft;
 use drivetrain::time::{Instant, Tick};
+use drivetrain::units::{Angle, AngularVelocity};
 
 /// A motor as a device, whichever type it has.
 pub(crate) trait Device {
@@ -21,6 +23,12 @@ pub(crate) trait Device {
     fn is_armed(&mut self) -> bool;
     /// Sets a share of the target that the test of a mode drives to.
     fn set(&mut self, share: f32) -> Result<(), TargetError>;
+    /// Turns the positive direction round.
+    fn reverse(&mut self);
+    fn set_present_angle(&mut self, angle_rad: f32) -> Result<(), TargetError>;
+    fn angle_rad(&self) -> Option<f32>;
+    fn velocity_rad_per_s(&self) -> Option<f32>;
+    fn knows_angle_from_power_on(&self) -> bool;
     fn link(&self) -> Link;
     fn claims(&self) -> Vec<Claim>;
     fn has_rival(&self) -> bool;
@@ -34,7 +42,7 @@ pub(crate) type Set<M> = fn(&mut Own<M>, f32) -> Result<(), TargetError>;
 /// A motor, and the target that it is driven to.
 pub(crate) struct Driven<M>(pub(crate) Own<M>, pub(crate) Set<M>);
 
-impl<M: OwnMotor> Device for Driven<M> {
+impl<M: OwnMotor + Copy> Device for Driven<M> {
     fn update(&mut self, tick: Tick) {
         Devices::update(&mut self.0, tick);
     }
@@ -64,6 +72,21 @@ impl<M: OwnMotor> Device for Driven<M> {
     }
     fn set(&mut self, share: f32) -> Result<(), TargetError> {
         (self.1)(&mut self.0, share)
+    }
+    fn reverse(&mut self) {
+        self.0 = self.0.reversed();
+    }
+    fn set_present_angle(&mut self, angle_rad: f32) -> Result<(), TargetError> {
+        self.0.set_present_angle(Angle::from_radians(angle_rad))
+    }
+    fn angle_rad(&self) -> Option<f32> {
+        AngleDrive::angle(&self.0, ()).map(Angle::as_radians)
+    }
+    fn velocity_rad_per_s(&self) -> Option<f32> {
+        VelocityDrive::velocity(&self.0, ()).map(AngularVelocity::as_rad_per_s)
+    }
+    fn knows_angle_from_power_on(&self) -> bool {
+        self.0.motor().capabilities().has(Capability::AbsoluteAngle)
     }
     fn link(&self) -> Link {
         self.0.guard().link()

@@ -94,7 +94,7 @@ fn rests(mut bench: Bench) {
 
 #[test]
 fn a_reversed_motor_turns_the_other_way_in_each_mode() {
-    let reversed = |bench: &mut Bench| bench.own = Own::new(bench.own.motor().reversed());
+    let reversed = |bench: &mut Bench| bench.own = bench.own.reversed();
     let mut torqued = Bench::new(Model::MG5010E_I10, torque());
     reversed(&mut torqued);
     torqued.steps(100, |_| {});
@@ -104,7 +104,7 @@ fn a_reversed_motor_turns_the_other_way_in_each_mode() {
     assert!(torqued.own.velocity(()).unwrap().as_rad_per_s() > 2.5);
 
     let mut position = Bench::new(Model::MG5010E_I10, Mode::position_velocity(rad_s(8.0)));
-    position.own = Own::new(position.own.motor().reversed());
+    position.own = position.own.reversed();
     position.steps(100, |_| {});
     position.own.arm(position.now()).unwrap();
     position.steps(1_500, |bench| bench.own.set_angle((), rad(1.0)).unwrap());

@@ -105,13 +105,15 @@ fn each_mode_reaches_its_target_with_each_firmware_and_rests_after_a_disarm() {
 
 #[test]
 fn a_reversed_gear_turns_the_shaft_the_other_way_and_its_torque_too() {
-    let mut wheel = Bench::with(motor(torque(), Firmware::V0_6).reversed(), -GEAR);
+    let mut wheel = Bench::with(motor(torque(), Firmware::V0_6), -GEAR);
+    wheel.own = wheel.own.reversed();
     wheel.arm();
     wheel.steps(300, |bench| bench.own.set_torque(0.5).unwrap());
     assert!((wheel.drive.shaft().torque_nm() - 0.5).abs() < 1e-3);
     wheel.steps(1_000, |bench| bench.own.set_velocity((), velocity(-4.0)).unwrap());
     assert!((wheel.drive.shaft().velocity_rad_per_s() + 4.0).abs() < 0.2);
-    let mut joint = Bench::with(motor(Mode::position(3.0), Firmware::V0_5).reversed(), -GEAR);
+    let mut joint = Bench::with(motor(Mode::position(3.0), Firmware::V0_5), -GEAR);
+    joint.own = joint.own.reversed();
     joint.arm();
     joint.steps(2_000, |bench| bench.own.set_angle((), angle(-1.0)).unwrap());
     assert!((joint.drive.shaft().angle_rad() + 1.0).abs() < 0.02);

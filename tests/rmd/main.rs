@@ -91,7 +91,7 @@ fn rests(mut bench: Bench) {
 fn a_reversed_motor_turns_the_other_way_in_each_mode() {
     fn turns(mode: impl Into<Mode>, set: fn(&mut Own<Motor>)) -> (f32, f32) {
         let mut bench = Bench::new(MODEL, mode);
-        bench.own = Own::new(bench.own.motor().reversed());
+        bench.own = bench.own.reversed();
         bench.steps(100, |_| {});
         bench.own.arm(bench.now()).unwrap();
         bench.steps(1_500, |bench| set(&mut bench.own));

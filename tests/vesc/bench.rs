@@ -16,7 +16,6 @@ pub(crate) const MODEL: Model = Model {
     torque_constant_nm_per_a: 0.05,
     current_limit_a: 20.0,
     max_velocity: AngularVelocity::from_rad_per_s(300.0),
-    is_reversed: false,
 };
 
 /// 7 pole pairs, no gear, 0.05 Nm/A; the drive has twice the current of the model.

@@ -224,8 +224,9 @@ fn the_current_stays_within_the_limit_whatever_is_asked() {
 #[test]
 fn a_reversed_motor_behind_a_gear_has_its_units_at_the_output_shaft() {
     let gear = GearRatio::new(9, 1).unwrap();
-    let model = Model { gear, is_reversed: true, ..MODEL };
+    let model = Model { gear, ..MODEL };
     let mut bench = Bench::of(Motor::new(model, 23, Mode::current()).unwrap());
+    bench.own = bench.own.reversed();
     // The bench's drive has no gear: 90 rad/s of its rotor are 10 of the output shaft, the other way round.
     bench.drive.shaft_mut().set_velocity(90.0);
     bench.step();

@@ -304,6 +304,9 @@ fn motor() {
     Own::<AnyMotor>::with_health.call();
     Own::<AnyMotor>::health.call();
     Own::<AnyMotor>::with_opening.call();
+    Own::<AnyMotor>::reversed.call();
+    Own::<AnyMotor>::with_zero.call();
+    Own::<AnyMotor>::set_present_angle.call();
     Own::<AnyMotor>::set_torque.call();
     Own::<AnyMotor>::set_impedance.call();
     Own::<AnyMotor>::motor_mut.call();

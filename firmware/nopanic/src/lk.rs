@@ -29,7 +29,6 @@ pub fn call_all() {
 
 fn motor() {
     (|model, id, mode: Mode| Motor::new(model, id, mode)).call();
-    Motor::reversed.call();
     Motor::feedback.call();
     Motor::state.call();
     Motor::inquire.call();

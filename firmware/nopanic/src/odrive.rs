@@ -27,7 +27,6 @@ fn motor() {
     })
     .call();
     Motor::with_gear.call();
-    Motor::reversed.call();
     Motor::with_endpoints.call();
     Motor::feedback.call();
     Motor::heartbeat.call();

@@ -25,7 +25,6 @@ pub fn call_all() {
 
 fn motor() {
     (|model, id, mode: Mode| Motor::new(model, id, mode)).call();
-    Motor::reversed.call();
     Motor::with_timeout.call();
     Motor::without_timeout.call();
     Motor::reset_drive.call();

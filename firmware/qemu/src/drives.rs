@@ -265,7 +265,6 @@ pub fn rows() {
         torque_constant_nm_per_a: 0.5,
         current_limit_a: 20.0,
         max_velocity: AngularVelocity::from_rpm(500.0),
-        is_reversed: false,
     };
     let motor = VescMotor {
         pole_pairs: 15,

@@ -204,6 +204,9 @@ impl<M: OwnMotor> Own<M> {
         if was_online && !self.was_online {
             self.motor.forget_settings();
         }
+        if self.guard.link() == Link::Offline {
+            self.doubt_zero();
+        }
         let is_idle = !self.power.is_on() && !self.has_posted && self.offered.is_rest;
         let is_due = now < self.inquired || now.since(self.inquired) >= INQUIRY;
         if !is_idle || !is_due || self.motor.is_enabled() == Some(true) {
@@ -295,11 +298,8 @@ impl<M: OwnMotor> Own<M> {
             if !self.guard.has_target() {
                 self.relax();
             }
-            let is_enabling = may_drive && self.switched.is_some();
-            if is_enabling && self.rest_disables {
-                return self.motor.poll();
-            }
-            return Some(self.rest());
+            let polls = may_drive && self.switched.is_some() && self.rest_disables;
+            return if polls { self.motor.poll() } else { Some(self.rest()) };
         }
         if step.is_hold() {
             return self.offered.frame;
@@ -374,9 +374,8 @@ impl<M: OwnMotor> Own<M> {
 
     fn offer(&mut self, command: Option<CanFrame>) {
         self.withdraw();
-        let frame = command.or(self.offered.frame);
-        self.offered =
-            Offered { frame, waits: command.is_some(), may_repeat: false, is_rest: false };
+        let (frame, waits) = (command.or(self.offered.frame), command.is_some());
+        self.offered = Offered { frame, waits, ..Offered::NOTHING };
     }
 
     /// Takes back a frame still waiting for the bus.

@@ -2,10 +2,10 @@
 
 mod device;
 mod impedance;
+mod joint;
 mod mode;
 mod motor;
 mod power;
-mod questions;
 mod registers;
 mod route;
 mod settings;
@@ -15,25 +15,25 @@ pub(crate) use impedance::TorqueLoops;
 pub use motor::{Impedance, Order, OwnMotor, Target};
 pub use settings::{Inquiry, Settings};
 
-pub(crate) use mode::{ControlMode, Goal, Shaft, inside};
+pub(crate) use mode::{ControlMode, Goal, Questions, Shaft, Told, inside};
 pub(crate) use motor::ingest_eight;
-pub(crate) use questions::{Questions, Told};
 pub(crate) use registers::{
     Form, code_from, lowest_bit, mit_model, models, register_questions, registers,
 };
 pub(crate) use settings::{Preparation, TimeoutUnits};
 
 use super::{
-    AngleDrive, BusLoad, CanDevice, Capabilities, Capability, Claim, Devices, Guard, Health,
-    HealthConfig, Ingest, Link, Role, Severity, TargetError, Timeouts, VelocityDrive, Visitor,
-    Vitals, Watch,
+    BusLoad, Capability, Claim, Guard, Health, HealthConfig, Ingest, Link, Role, Severity,
+    TargetError, Timeouts, Vitals, Watch,
 };
+use crate::error::{ConfigError, finite};
 use crate::frame::CanFrame;
 use crate::time::{Duration, Instant};
 use crate::units::{Angle, AngularVelocity};
 use embedded_can::Frame;
+use joint::{Joint, Zero};
 use power::Power;
-use route::Route;
+use route::{Offered, Route};
 
 /// The most frames a second for the power of a drive, each beside a command or rest.
 const POWER_HZ: u32 = 100;
@@ -102,10 +102,12 @@ const INQUIRY: Duration = Duration::from_millis(10);
 #[derive(Debug, Clone, Copy)]
 pub struct Own<M> {
     motor: M,
+    joint: Joint,
     route: Route,
     guard: Guard,
     watch: Watch,
     power: Power,
+    /// In the direction of the drive, as all below.
     target: Target,
     /// The angle of the shaft when an angle target was followed first.
     start: Option<Angle>,
@@ -133,29 +135,13 @@ pub struct Own<M> {
     rival: Option<Claim>,
 }
 
-/// The frame of the last update: a command, rest, or a frame in the place of either.
-#[derive(Debug, Clone, Copy)]
-struct Offered {
-    /// `None` before the first.
-    frame: Option<CanFrame>,
-    /// The frame is still to be taken.
-    waits: bool,
-    /// A command, which an update without a step may send once more.
-    may_repeat: bool,
-    /// Rest, not given back by the driver.
-    is_rest: bool,
-}
-
-impl Offered {
-    const NOTHING: Self = Self { frame: None, waits: false, may_repeat: false, is_rest: false };
-}
-
 impl<M: OwnMotor> Own<M> {
     /// Takes the motor: disarmed.
     #[must_use]
     pub const fn new(motor: M) -> Self {
         Self {
             motor,
+            joint: Joint::DIRECT,
             route: Route::UNKNOWN,
             guard: Guard::new(),
             watch: Watch::new(),
@@ -205,7 +191,58 @@ impl<M: OwnMotor> Own<M> {
         Self { guard: self.guard.with_opening(time), ..self }
     }
 
-    /// Returns the motor.
+    /// Turns the positive direction round, of targets and of measurements: for a wheel or a joint on the other side of a robot.
+    #[must_use]
+    pub fn reversed(mut self) -> Self {
+        self.joint.sign = -self.joint.sign;
+        self
+    }
+
+    /// Takes the angle of the drive at which the joint is at zero: angles are counted from there.
+    ///
+    /// # Errors
+    /// [`ConfigError::NotFinite`] for an angle that is not finite.
+    pub fn with_zero(mut self, angle: Angle) -> Result<Self, ConfigError> {
+        finite("zero", angle.as_radians())?;
+        self.joint.zero = Zero::Given(angle);
+        Ok(self)
+    }
+
+    /// Makes the present angle of the joint so much; the shaft follows its target as before.
+    ///
+    /// A drive without [`Capability::AbsoluteAngle`] counts from another angle after it lost its supply. Once such a drive was offline or
+    /// has reset, the joint has no angle, and targets with an angle are refused as [`TargetError::NotHomed`], until this is called again.
+    ///
+    /// # Errors
+    /// [`TargetError::NoFeedback`] without fresh feedback with an angle, and [`TargetError::NotFinite`].
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::damiao::{Model, Motor};
+    /// use drivetrain::frame::CanFrame;
+    /// use drivetrain::motor::{AngleDrive, CanDevice, ImpedanceControl, Own};
+    /// use drivetrain::time::Instant;
+    /// use drivetrain::units::Angle;
+    ///
+    /// let mut knee = Own::new(Motor::new(Model::J4310, 1, ImpedanceControl::new(3.0)?)?).reversed();
+    /// let feedback = [0x11, 0x94, 0x7A, 0x7F, 0xF7, 0xFF, 30, 35]; // 2 rad of 12.5
+    /// knee.ingest(&CanFrame::standard(0x011, feedback), Instant::from_micros(1_000));
+    /// assert!((knee.angle(()).ok_or("no angle")?.as_radians() + 2.0).abs() < 1e-3);
+    /// knee.set_present_angle(Angle::from_radians(0.5))?;
+    /// assert!((knee.angle(()).ok_or("no angle")?.as_radians() - 0.5).abs() < 1e-3);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn set_present_angle(&mut self, angle: Angle) -> Result<(), TargetError> {
+        let measured = self.motor.angle().filter(|_| self.is_online());
+        let zero = measured.ok_or(TargetError::NoFeedback)? - angle * self.joint.sign;
+        if !zero.is_finite() {
+            return Err(TargetError::NotFinite);
+        }
+        self.joint.zero = Zero::Found(zero);
+        Ok(())
+    }
+
+    /// Returns the motor, whose values are in the direction and from the zero of the drive.
     #[must_use]
     pub const fn motor(&self) -> &M {
         &self.motor
@@ -260,7 +297,7 @@ impl<M: OwnMotor> Own<M> {
     /// # Errors
     /// Says why the motor cannot take the target now. The value is then not kept for later.
     pub fn set_torque(&mut self, torque_nm: f32) -> Result<(), TargetError> {
-        self.set(Capability::Torque, Target::Torque(torque_nm), torque_nm.is_finite())
+        self.set(Capability::Torque, Target::Torque(torque_nm))
     }
 
     /// Sets a spring and a damper at the output shaft, and a torque beside them.
@@ -269,21 +306,17 @@ impl<M: OwnMotor> Own<M> {
     /// Says why the motor cannot take the target now: [`TargetError::NotFinite`] also for a stiffness or a damping below zero. The
     /// value is then not kept for later.
     pub fn set_impedance(&mut self, target: Impedance) -> Result<(), TargetError> {
-        self.set(Capability::Impedance, Target::Impedance(target), target.is_finite())
+        self.set(Capability::Impedance, Target::Impedance(target))
     }
 
-    fn set(
-        &mut self,
-        kind: Capability,
-        target: Target,
-        is_finite: bool,
-    ) -> Result<(), TargetError> {
+    fn set(&mut self, kind: Capability, target: Target) -> Result<(), TargetError> {
         if !self.motor.capabilities().has(kind) {
             return Err(TargetError::Unsupported);
         }
+        let target = self.joint.target_of_drive(target)?;
         // Where there was no target, the command is of one before.
         self.offered.may_repeat &= self.guard.has_target();
-        self.guard.admit(is_finite)?;
+        self.guard.admit(target.is_finite())?;
         self.target = target;
         Ok(())
     }
@@ -343,47 +376,13 @@ impl<M: OwnMotor> Own<M> {
         _ = self.watch.check(&mut self.guard, || vitals, now);
         self.guard.relax_until_armed();
         self.motor.forget_settings();
-    }
-}
-
-impl<M: OwnMotor> Devices for Own<M> {
-    #[inline]
-    fn visit(&mut self, visitor: &mut impl Visitor) {
-        visitor.visit(self);
+        self.doubt_zero();
     }
 
-    #[inline]
-    fn usual_feedback(&self) -> Option<(u32, u32)> {
-        self.route.usual()
-    }
-
-    #[inline]
-    fn next_frame(&mut self, _turn: u32) -> Option<CanFrame> {
-        CanDevice::next_frame(self)
-    }
-}
-
-/// There is one motor, so its handle is `()`.
-impl<M: OwnMotor> VelocityDrive<()> for Own<M> {
-    fn velocity(&self, (): ()) -> Option<AngularVelocity> {
-        self.is_online().then(|| self.motor.velocity())
-    }
-
-    fn capabilities(&self, (): ()) -> Capabilities {
-        self.motor.capabilities()
-    }
-
-    fn set_velocity(&mut self, (): (), target: AngularVelocity) -> Result<(), TargetError> {
-        self.set(Capability::Velocity, Target::Velocity(target), target.is_finite())
-    }
-}
-
-impl<M: OwnMotor> AngleDrive<()> for Own<M> {
-    fn angle(&self, (): ()) -> Option<Angle> {
-        if self.is_online() { self.motor.angle() } else { None }
-    }
-
-    fn set_angle(&mut self, (): (), target: Angle) -> Result<(), TargetError> {
-        self.set(Capability::Angle, Target::Angle(target), target.is_finite())
+    /// The drive may have lost its supply.
+    fn doubt_zero(&mut self) {
+        if !self.motor.capabilities().has(Capability::AbsoluteAngle) {
+            self.joint.lose_zero();
+        }
     }
 }

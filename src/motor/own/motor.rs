@@ -155,6 +155,17 @@ pub enum Target {
     Impedance(Impedance),
 }
 
+impl Target {
+    pub(super) const fn is_finite(&self) -> bool {
+        match self {
+            Self::Torque(torque_nm) => torque_nm.is_finite(),
+            Self::Velocity(velocity) => velocity.is_finite(),
+            Self::Angle(angle) => angle.is_finite(),
+            Self::Impedance(impedance) => impedance.is_finite(),
+        }
+    }
+}
+
 /// A target with its limits, for one step: see [`OwnMotor::control`](super::OwnMotor::control).
 ///
 /// Destructure it, `let Order { target, share, step } = order;`: the compiler then warns if a field is not used.

@@ -1,7 +1,8 @@
-//! The selection of frames for an own motor.
+//! The frames of an own motor: which are for the motor, and the offered one.
 
+use super::{Own, OwnMotor};
 use crate::frame::CanFrame;
-use crate::motor::{Claim, Role};
+use crate::motor::{CanDevice, Claim, Devices, Role, Visitor};
 
 /// The ids of the feedback and of the commands of one motor, each as one pattern: a frame outside of both patterns is another device's.
 #[derive(Debug, Clone, Copy)]
@@ -114,6 +115,41 @@ impl Pattern {
     /// Tells whether some header fits both.
     const fn meets(&self, other: &Self) -> bool {
         (self.header ^ other.header) & self.mask & other.mask == 0
+    }
+}
+
+/// The frame of the last update: a command, rest, or a frame in the place of either.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Offered {
+    /// `None` before the first.
+    pub(super) frame: Option<CanFrame>,
+    /// The frame is still to be taken.
+    pub(super) waits: bool,
+    /// A command, which an update without a step may send once more.
+    pub(super) may_repeat: bool,
+    /// Rest, not given back by the driver.
+    pub(super) is_rest: bool,
+}
+
+impl Offered {
+    pub(super) const NOTHING: Self =
+        Self { frame: None, waits: false, may_repeat: false, is_rest: false };
+}
+
+impl<M: OwnMotor> Devices for Own<M> {
+    #[inline]
+    fn visit(&mut self, visitor: &mut impl Visitor) {
+        visitor.visit(self);
+    }
+
+    #[inline]
+    fn usual_feedback(&self) -> Option<(u32, u32)> {
+        self.route.usual()
+    }
+
+    #[inline]
+    fn next_frame(&mut self, _turn: u32) -> Option<CanFrame> {
+        CanDevice::next_frame(self)
     }
 }
 

@@ -150,7 +150,6 @@ impl Vesc {
             torque_constant_nm_per_a: 0.05,
             current_limit_a: 20.0,
             max_velocity: AngularVelocity::from_rad_per_s(300.0),
-            is_reversed: false,
         };
         let motor = vesc::Motor::new(model, 23, vesc::Mode::current()).unwrap();
         Self(own(motor.without_fault_code(), setup))

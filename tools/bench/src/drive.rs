@@ -312,7 +312,6 @@ fn kind(spec: Spec) -> Result<(Kind, f32), String> {
                 torque_constant_nm_per_a: MOTOR_NM_PER_A,
                 current_limit_a: MOTOR_A,
                 max_velocity: AngularVelocity::from_rpm(MOTOR_RPM),
-                is_reversed: false,
             };
             let motor = vesc::Motor::new(model, id, vesc::Mode::current()).map_err(text)?;
             (Kind::Vesc(Own::new(motor)), model.torque_limit_nm())

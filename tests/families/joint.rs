@@ -1,0 +1,100 @@
+//! A joint that turns the other way than its drive, and counts from another zero.
+
+use crate::motors::FAMILIES;
+use crate::station::Station;
+use drivetrain::math::wrap_pi;
+use drivetrain::motor::{Link, TargetError};
+
+/// Each family and mode, and a motor in it.
+fn stations() -> impl Iterator<Item = (String, fn() -> Station)> {
+    FAMILIES.iter().flat_map(|family| {
+        family.modes.iter().map(|(mode, make)| (format!("{}, {mode}", family.name), *make))
+    })
+}
+
+#[test]
+fn a_reversed_motor_with_the_opposite_target_sends_the_same_frames() {
+    for (name, make) in stations() {
+        let (mut direct, mut reversed) = (make(), make());
+        reversed.device.reverse();
+        let mut was_driven = false;
+        for ms in 0..650 {
+            if ms == 150 {
+                direct.device.arm(direct.now()).unwrap();
+                reversed.device.arm(reversed.now()).unwrap();
+            }
+            if ms >= 150 {
+                direct.device.set(1.0).unwrap();
+                reversed.device.set(-1.0).unwrap();
+            }
+            direct.step();
+            reversed.step();
+            assert_eq!(direct.frames, reversed.frames, "{name}, {ms} ms");
+            was_driven |= !direct.rests();
+            let velocity = reversed.device.velocity_rad_per_s().map(|velocity| -velocity);
+            assert_eq!(direct.device.velocity_rad_per_s(), velocity, "{name}, {ms} ms");
+            let angle = reversed.device.angle_rad().map(|angle| -angle);
+            assert_eq!(direct.device.angle_rad(), angle, "{name}, {ms} ms");
+        }
+        assert!(was_driven, "{name}");
+    }
+}
+
+#[test]
+fn a_joint_goes_to_angles_from_its_own_zero() {
+    let to_angles =
+        stations().filter(|(name, _)| name.contains("angle") || name.contains("position"));
+    let mut names = Vec::new();
+    for (name, make) in to_angles {
+        // A count of the tachometer is 0.15 rad.
+        let near_rad = if name == "vesc, current, angle" { 0.3 } else { 0.03 };
+        for is_reversed in [false, true] {
+            let mut station = make().settled();
+            if is_reversed {
+                station.device.reverse();
+            }
+            station.device.set_present_angle(0.75).unwrap();
+            assert!((station.device.angle_rad().unwrap() - 0.75).abs() < 1e-3, "{name}");
+            station.device.arm(station.now()).unwrap();
+            station.steps(3_000, |station| station.device.set(1.0).unwrap()); // to 1.5 rad
+            let way = if is_reversed { -0.75 } else { 0.75 };
+            let turned = station.drive.shaft().angle_rad();
+            assert!((turned - way).abs() < near_rad, "{name}: {turned} rad");
+            let off = wrap_pi(station.device.angle_rad().unwrap() - 1.5);
+            assert!(off.abs() < near_rad, "{name}: {off} rad");
+            // A new zero moves nothing by itself.
+            station.device.set_present_angle(-2.0).unwrap();
+            station.steps(50, |_| {});
+            assert!((station.drive.shaft().angle_rad() - turned).abs() < near_rad, "{name}");
+            assert_eq!(station.device.set_present_angle(f32::NAN), Err(TargetError::NotFinite));
+        }
+        names.push(name);
+    }
+    assert!(names.len() > 12, "{names:?}");
+}
+
+#[test]
+fn a_zero_found_by_the_program_ends_with_the_supply_unless_the_drive_knows_its_angle() {
+    for family in &FAMILIES {
+        let mut station = family.at_position().settled();
+        let knows = station.device.knows_angle_from_power_on();
+        station.device.set_present_angle(1.0).unwrap();
+        station.is_deaf = true;
+        station.steps(90, |_| {});
+        assert_eq!(station.device.link(), Link::Late, "{}", family.name);
+        station.is_deaf = false;
+        station.steps(150, |_| {});
+        assert!(station.device.angle_rad().is_some(), "{}: a short silence", family.name);
+        station.is_deaf = true;
+        station.steps(900, |_| {});
+        assert_eq!(station.device.set_present_angle(1.0), Err(TargetError::NoFeedback));
+        station.is_deaf = false;
+        station.steps(150, |_| {});
+        assert_eq!(station.device.link(), Link::Online, "{}", family.name);
+        assert_eq!(station.device.angle_rad().is_some(), knows, "{}", family.name);
+        let refused = if knows { TargetError::Disarmed } else { TargetError::NotHomed };
+        assert_eq!(station.device.set(1.0), Err(refused), "{}", family.name);
+        station.device.set_present_angle(1.0).unwrap();
+        assert_eq!(station.device.set(1.0), Err(TargetError::Disarmed), "{}", family.name);
+    }
+}
