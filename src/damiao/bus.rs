@@ -3,6 +3,7 @@
 use super::codec::{CLEAR_ERROR, Command, REGISTERS, inquiry, is_answer, refresh, value};
 use super::config::Mode;
 use super::{Feedback, Model, Register, Status};
+use crate::control::PidConfig;
 use crate::error::ConfigError;
 use crate::frame::{CanFrame, standard_id};
 use crate::motor::{
@@ -201,6 +202,10 @@ impl OwnMotor for Motor {
 
     fn reset(&mut self) {
         self.mode.0.reset();
+    }
+
+    fn set_loops(&mut self, position: PidConfig, speed: PidConfig) -> Result<(), ConfigError> {
+        self.mode.0.set_loops(position, speed)
     }
 
     /// Asks for unknown settings, then writes the time-out and reads the register back, then enables the drive: each time

@@ -365,6 +365,18 @@ mod tests {
     }
 
     #[test]
+    fn each_gain_has_its_own_factor() {
+        let wheel = Config::<M3508>::new(1);
+        let (kp, ki, kd) = WordGains::per_rotor_rpm(9.0, 12.0, 0.6).speed_loop(&wheel).gains();
+        let degrees = WordGains::per_rotor_degree_per_s(1.5, 0.01, 20.0).each_step(0.005);
+        let found = degrees.speed_loop(&wheel).gains();
+        for (found, expected) in [(found.0, kp), (found.1, ki), (found.2, kd)] {
+            assert!((found / expected - 1.0).abs() < 1e-6, "{found} and not {expected}");
+        }
+        assert!((ki / kp - 12.0 / 9.0).abs() < 1e-6 && (kd / kp - 0.6 / 9.0).abs() < 1e-7);
+    }
+
+    #[test]
     fn a_full_scale_or_gearbox_of_its_own_counts() {
         let (kp, ..) = WordGains::per_rotor_rpm(1.0, 0.0, 0.0)
             .speed_loop(&Config::<M3508>::new(1).with_gear(GearRatio::DIRECT))

@@ -4,6 +4,7 @@ use super::codec::{id_of, is_command};
 use super::config::Mode;
 use super::model::{MOST_COUNTS, RAD_PER_DEGREE};
 use super::{Command, Feedback, Model, State};
+use crate::control::PidConfig;
 use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::{
@@ -236,6 +237,10 @@ impl OwnMotor for Motor {
     fn reset(&mut self) {
         self.mode.0.reset();
         (self.questions, self.silent) = (Questions::new(Command::REST), 0);
+    }
+
+    fn set_loops(&mut self, position: PidConfig, speed: PidConfig) -> Result<(), ConfigError> {
+        self.mode.0.set_loops(position, speed)
     }
 
     /// Sends run and the question for the state in turn, then the question for the angle if commands count from the angle.

@@ -6,6 +6,8 @@ use super::codec::{
 };
 use super::config::Endpoint;
 use super::{Endpoints, Feedback, Firmware, Heartbeat, Motor};
+use crate::control::PidConfig;
+use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::{
     Capabilities, Capability, Claim, Goal, Ingest, MotorName, Order, OwnMotor, Role, Told, Vitals,
@@ -120,6 +122,10 @@ impl OwnMotor for Motor {
 
     fn reset(&mut self) {
         self.mode.control.reset();
+    }
+
+    fn set_loops(&mut self, position: PidConfig, speed: PidConfig) -> Result<(), ConfigError> {
+        self.mode.control.set_loops(position, speed)
     }
 
     fn enable(&mut self, sent: u8) -> Option<CanFrame> {

@@ -2,6 +2,8 @@
 
 use super::model::AMPERES_PER_COUNT;
 use super::{Command, Feedback, Motor, State};
+use crate::control::PidConfig;
+use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::lk::bus::{SILENT, whole};
 use crate::lk::codec::{id_of, is_command};
@@ -153,6 +155,10 @@ impl OwnMotor for Motor {
     fn reset(&mut self) {
         self.mode.0.reset();
         (self.questions, self.silent) = (Questions::new(Command::REST), 0);
+    }
+
+    fn set_loops(&mut self, position: PidConfig, speed: PidConfig) -> Result<(), ConfigError> {
+        self.mode.0.set_loops(position, speed)
     }
 
     /// Sends the question for the state, the time-out unless confirmed, and the preparation of the mode.

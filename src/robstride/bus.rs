@@ -3,6 +3,7 @@
 use super::codec::{Command, FAULTS, VALUE, answer, register};
 use super::config::Mode;
 use super::{Feedback, Model, Register, Status};
+use crate::control::PidConfig;
 use crate::encoder::Laps;
 use crate::error::{ConfigError, check};
 use crate::frame::{CanFrame, extended_id};
@@ -256,6 +257,10 @@ impl OwnMotor for Motor {
 
     fn reset(&mut self) {
         self.mode.reset();
+    }
+
+    fn set_loops(&mut self, position: PidConfig, speed: PidConfig) -> Result<(), ConfigError> {
+        self.mode.control.set_loops(position, speed)
     }
 
     /// Asks for unknown settings, then makes the preparations, each written and read back, then enables the drive:

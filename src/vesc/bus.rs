@@ -3,6 +3,7 @@
 use super::codec::{HOST, SHORT_MESSAGE, extended, fault, question};
 use super::config::{At, Mode, Rest};
 use super::{Feedback, Model};
+use crate::control::PidConfig;
 use crate::encoder;
 use crate::encoder::Tachometer;
 use crate::error::ConfigError;
@@ -241,6 +242,10 @@ impl OwnMotor for Motor {
     fn reset(&mut self) {
         self.mode.reset();
         self.effort = Some(0.0);
+    }
+
+    fn set_loops(&mut self, position: PidConfig, speed: PidConfig) -> Result<(), ConfigError> {
+        self.mode.set_loops(position, speed)
     }
 
     fn inquire(&mut self) -> Option<CanFrame> {

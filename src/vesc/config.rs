@@ -234,6 +234,21 @@ impl Mode {
         }
     }
 
+    /// The loop of duty control is the speed loop.
+    pub(super) fn set_loops(
+        &mut self,
+        position: PidConfig,
+        speed: PidConfig,
+    ) -> Result<(), ConfigError> {
+        match &mut self.0 {
+            Kind::Current(CurrentControl { loops: Some(loops), .. }) => {
+                loops.set_config(position, speed)
+            }
+            Kind::Duty(control) => control.speed.set_config(speed),
+            _ => Err(ConfigError::Unsupported("loops")),
+        }
+    }
+
     pub(super) fn reset(&mut self) {
         match &mut self.0 {
             Kind::Current(CurrentControl { loops: Some(loops), .. }) => loops.reset(),

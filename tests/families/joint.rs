@@ -1,9 +1,13 @@
 //! A joint that turns the other way than its drive, and counts from another zero.
 
-use crate::motors::FAMILIES;
+use crate::motors::{FAMILIES, VESC};
 use crate::station::Station;
+use drivetrain::control::PidConfig;
+use drivetrain::error::ConfigError;
 use drivetrain::math::wrap_pi;
-use drivetrain::motor::{Link, TargetError};
+use drivetrain::motor::{ImpedanceControl, Link, Own, OwnMotor, TargetError};
+use drivetrain::units::AngularVelocity;
+use drivetrain::{damiao, lk, odrive, rmd, robstride, vesc};
 
 /// Each family and mode, and a motor in it.
 fn stations() -> impl Iterator<Item = (String, fn() -> Station)> {
@@ -96,5 +100,45 @@ fn a_zero_found_by_the_program_ends_with_the_supply_unless_the_drive_knows_its_a
         assert_eq!(station.device.set(1.0), Err(refused), "{}", family.name);
         station.device.set_present_angle(1.0).unwrap();
         assert_eq!(station.device.set(1.0), Err(TargetError::Disarmed), "{}", family.name);
+    }
+}
+
+/// Tries to change the loops of a motor, with good and with bad gains.
+fn change(motor: Result<impl OwnMotor, ConfigError>) -> [Result<(), ConfigError>; 2] {
+    let mut own = Own::new(motor.unwrap());
+    let position = PidConfig::new(8.0, 0.0, 0.0).with_output_limit(10.0);
+    [0.4, -0.4].map(|kp| own.set_loops(position, PidConfig::new(kp, 2.0, 0.0)))
+}
+
+#[test]
+fn each_family_changes_the_loops_that_run_here_and_refuses_others() {
+    let position = PidConfig::new(10.0, 0.0, 0.0).with_output_limit(20.0);
+    let speed = PidConfig::new(0.2, 1.0, 0.0);
+    let loops = || ImpedanceControl::new(2.0).unwrap().with_loops(position, speed).unwrap();
+    let gains = || ImpedanceControl::new(2.0).unwrap().with_gains(20.0, 0.6).unwrap();
+    let quick = AngularVelocity::from_rad_per_s(20.0);
+    let axis =
+        |mode| odrive::Motor::new(odrive::Model::D6374, odrive::Firmware::V0_6, 3, quick, mode);
+    let wheel = |mode| vesc::Motor::new(VESC, 23, mode);
+    for changed in [
+        change(damiao::Motor::new(damiao::Model::J4310, 1, loops())),
+        change(lk::Motor::new(lk::Model::MF9025_16T, 1, loops())),
+        change(rmd::Motor::new(rmd::Model::X8_120, 1, loops())),
+        change(robstride::Motor::new(robstride::Model::RS02, 1, loops())),
+        change(axis(loops())),
+        change(wheel(vesc::Mode::current_with_loops(position, speed).unwrap())),
+        change(wheel(vesc::Mode::duty(0.4, speed).unwrap())),
+    ] {
+        assert_eq!(changed, [Ok(()), Err(ConfigError::Negative("kp"))]);
+    }
+    for refused in [
+        change(damiao::Motor::new(damiao::Model::J4310, 1, gains())),
+        change(lk::Motor::new(lk::Model::MF9025_16T, 1, lk::Mode::velocity(quick))),
+        change(rmd::Motor::new(rmd::Model::X8_120, 1, gains())),
+        change(robstride::Motor::new(robstride::Model::RS02, 1, gains())),
+        change(axis(gains())),
+        change(wheel(vesc::Mode::current())),
+    ] {
+        assert_eq!(refused, [Err(ConfigError::Unsupported("loops")); 2]);
     }
 }

@@ -151,7 +151,7 @@ pub(crate) const FAMILIES: [Family; 6] = [
     },
 ];
 
-const VESC: vesc::Model = vesc::Model {
+pub(crate) const VESC: vesc::Model = vesc::Model {
     name: "6374",
     pole_pairs: 7,
     gear: GearRatio::DIRECT,

@@ -307,6 +307,7 @@ fn motor() {
     Own::<AnyMotor>::reversed.call();
     Own::<AnyMotor>::with_zero.call();
     Own::<AnyMotor>::set_present_angle.call();
+    Own::<AnyMotor>::set_loops.call();
     Own::<AnyMotor>::set_torque.call();
     Own::<AnyMotor>::set_impedance.call();
     Own::<AnyMotor>::motor_mut.call();

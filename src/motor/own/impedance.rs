@@ -77,6 +77,16 @@ impl ImpedanceControl {
         Ok(Self { loops: Some(loops), ..self })
     }
 
+    /// Changes our own loops, also while the motor is driven: the torque goes on without a jump, as with
+    /// [`Pid::set_config`](crate::control::Pid::set_config).
+    ///
+    /// # Errors
+    /// As [`with_loops`](Self::with_loops), and [`ConfigError::Unsupported`] without such loops. Nothing is changed then.
+    pub fn set_loops(&mut self, position: PidConfig, speed: PidConfig) -> Result<(), ConfigError> {
+        let loops = self.loops.as_mut().ok_or(ConfigError::Unsupported("loops"))?;
+        loops.set_config(position, speed.with_output_limit(self.torque_limit_nm))
+    }
+
     /// Returns the torque limit in Nm.
     #[must_use]
     pub const fn torque_limit_nm(&self) -> f32 {
@@ -266,6 +276,18 @@ impl TorqueLoops {
         Ok(Self { loops: Cascade::new(position, speed)?, before: Before::Rest })
     }
 
+    /// # Errors
+    /// As [`Cascade::new`]. Nothing is changed then.
+    pub(crate) fn set_config(
+        &mut self,
+        position: PidConfig,
+        speed: PidConfig,
+    ) -> Result<(), ConfigError> {
+        position.validate()?;
+        self.loops.speed_mut().set_config(speed)?;
+        self.loops.position_mut().set_config(position)
+    }
+
     /// Returns the torque for a velocity or an angle, possibly more than the limit; `None` for another target, and for an angle
     /// target without a measured angle. The integral keeps within the limit. The loops take over from a torque without a jump, and
     /// begin anew after an impedance.
@@ -344,6 +366,26 @@ mod tests {
 
     fn velocity(rad_per_s: f32) -> Target {
         Target::Velocity(AngularVelocity::from_rad_per_s(rad_per_s))
+    }
+
+    #[test]
+    fn new_gains_change_the_torque_of_the_next_change_alone() {
+        let (mut loops, step) = driven();
+        for _ in 0..100 {
+            step(&mut loops, velocity(1.0));
+        }
+        let before = step(&mut loops, velocity(1.0)).unwrap();
+        let position = PidConfig::new(20.0, 0.0, 0.0).with_output_limit(8.0);
+        let speed = PidConfig::new(1.5, 0.0, 0.0).with_incremental_form();
+        loops.set_config(position, speed).unwrap();
+        assert!((step(&mut loops, velocity(1.0)).unwrap() - before).abs() < 1e-6);
+        let more = step(&mut loops, velocity(2.0)).unwrap();
+        assert!((more - before - 1.5).abs() < 1e-6, "{more} Nm after {before} Nm");
+        let bad = PidConfig::new(f32::NAN, 0.0, 0.0);
+        for (position, speed) in [(bad, speed), (position, bad)] {
+            assert!(loops.set_config(position, speed).is_err());
+            assert_eq!(step(&mut loops, velocity(2.0)), Some(more));
+        }
     }
 
     /// A blocked shaft fills the integral. This integral must not drive the shaft after another kind of target.

@@ -26,6 +26,7 @@ use super::{
     BusLoad, Capability, Claim, Guard, Health, HealthConfig, Ingest, Link, Role, Severity,
     TargetError, Timeouts, Vitals, Watch,
 };
+use crate::control::PidConfig;
 use crate::error::{ConfigError, finite};
 use crate::frame::CanFrame;
 use crate::time::{Duration, Instant};
@@ -242,13 +243,21 @@ impl<M: OwnMotor> Own<M> {
         Ok(())
     }
 
+    /// Changes the motor's loops of this crate, from rad to rad/s and from rad/s to Nm, also while the motor is driven.
+    ///
+    /// # Errors
+    /// As [`OwnMotor::set_loops`].
+    pub fn set_loops(&mut self, position: PidConfig, speed: PidConfig) -> Result<(), ConfigError> {
+        self.motor.set_loops(position, speed)
+    }
+
     /// Returns the motor, whose values are in the direction and from the zero of the drive.
     #[must_use]
     pub const fn motor(&self) -> &M {
         &self.motor
     }
 
-    /// Returns the motor, to change its gains or to ask for a setting of its drive. Frames to be sent are unchanged until the next update.
+    /// Returns the motor, to ask for a setting of its drive, say. Frames to be sent are unchanged until the next update.
     #[must_use]
     pub const fn motor_mut(&mut self) -> &mut M {
         self.route = Route::UNKNOWN;

@@ -2,7 +2,7 @@
 //! that a drive is told.
 
 use super::{Impedance, ImpedanceControl, Order, Target};
-use crate::control::limited;
+use crate::control::{PidConfig, limited};
 use crate::error::ConfigError;
 use crate::math::wrap_pi;
 use crate::motor::{Capabilities, Capability};
@@ -135,6 +135,17 @@ impl ControlMode {
             Follows::Angle => Capabilities::of(&[Capability::Angle]),
         };
         capabilities.with(Capability::Feedback)
+    }
+
+    pub(crate) fn set_loops(
+        &mut self,
+        position: PidConfig,
+        speed: PidConfig,
+    ) -> Result<(), ConfigError> {
+        match &mut self.follows {
+            Follows::Impedance(control) => control.set_loops(position, speed),
+            _ => Err(ConfigError::Unsupported("loops")),
+        }
     }
 
     /// Returns the goal of a drive that follows torques; `None` to rest. The velocity of the shaft is known up to so many rad/s.

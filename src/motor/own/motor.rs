@@ -1,5 +1,7 @@
 //! The part of a motor of your own with its ids, frames and loop.
 
+use crate::control::PidConfig;
+use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::{
     Capabilities, Capability, Claim, Ingest, Malformed, MotorName, Vitals, WrongSetting,
@@ -52,6 +54,16 @@ pub trait OwnMotor {
 
     /// Brings the loop to rest: called before the motor is driven, and on a stop.
     fn reset(&mut self);
+
+    /// Changes the loops that this crate runs, from rad to rad/s and from rad/s to Nm, also while the motor is driven.
+    ///
+    /// # Errors
+    /// Names the parameter without a sensible value; [`ConfigError::Unsupported`], unless said otherwise, for a motor without such loops.
+    /// Nothing is changed then.
+    fn set_loops(&mut self, position: PidConfig, speed: PidConfig) -> Result<(), ConfigError> {
+        _ = (position, speed);
+        Err(ConfigError::Unsupported("loops"))
+    }
 
     /// Returns the next frame to enable the drive; `None`, the default, for a drive without such frames.
     ///
