@@ -11,7 +11,9 @@ use bench::{Bench, GEAR, motor, torque};
 use drivetrain::control::PidConfig;
 use drivetrain::error::ConfigError;
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{AngleDrive, Devices, Ingest, Malformed, Own, OwnMotor, VelocityDrive};
+use drivetrain::motor::{
+    AngleDrive, Condition, Devices, Ingest, Malformed, Own, OwnMotor, VelocityDrive,
+};
 use drivetrain::odrive::{Endpoints, Feedback, Firmware, Heartbeat, Mode, Model, Motor};
 use drivetrain::sim::{DriveShaft, OdriveDrive};
 use drivetrain::time::{Duration, Tick};
@@ -581,6 +583,9 @@ fn an_endpoint_that_is_not_confirmed_is_read_at_rest_and_never_written() {
     bench.arm();
     bench.steps(400, |bench| _ = bench.own.set_velocity((), velocity(5.0)));
     assert!(!Devices::is_armed(&mut bench.own) && bench.drive.state() == Heartbeat::IDLE);
+    let edges: Vec<_> = core::iter::from_fn(|| bench.own.next_edge()).collect();
+    let faults: Vec<_> = edges.iter().filter(|edge| edge.condition == Condition::Fault).collect();
+    assert!(faults.len() == 2 && faults[0].began && !faults[1].began, "{edges:?}");
     let (mut reads, mut writes) = (0, 0);
     bench.steps(2_000, |bench| {
         for frame in bench.frames.iter().filter(|frame| frame.header() == 0x64) {

@@ -237,7 +237,7 @@ impl<M: OwnMotor> Own<M> {
             self.enabling = 0;
         }
         match self.power.step(may_drive, now) {
-            Some(true) => self.enable(),
+            Some(true) => self.enable(now),
             Some(false) => self.disable(),
             None => {}
         }
@@ -246,9 +246,9 @@ impl<M: OwnMotor> Own<M> {
         }
     }
 
-    fn enable(&mut self) {
+    fn enable(&mut self, now: Instant) {
         if self.motor.wrong_setting().is_some_and(|wrong| wrong.found.is_some()) {
-            self.guard.relax_until_armed();
+            self.fail(now);
             return;
         }
         // Of several frames none is left out: the one before still waits for the bus.

@@ -312,8 +312,7 @@ impl<M: OwnMotor> Own<M> {
     /// Sets a spring and a damper at the output shaft, and a torque beside them.
     ///
     /// # Errors
-    /// Says why the motor cannot take the target now: [`TargetError::NotFinite`] also for a stiffness or a damping below zero. The
-    /// value is then not kept for later.
+    /// As [`set_torque`](Self::set_torque), and [`TargetError::NotFinite`] for a stiffness or a damping below zero.
     pub fn set_impedance(&mut self, target: Impedance) -> Result<(), TargetError> {
         self.set(Capability::Impedance, Target::Impedance(target))
     }
@@ -378,14 +377,18 @@ impl<M: OwnMotor> Own<M> {
 
     /// Takes the drive's report of its power.
     fn hear_power(&mut self, now: Instant) {
-        if !self.power.hear(self.motor.is_enabled(), now) {
-            return;
+        if self.power.hear(self.motor.is_enabled(), now) {
+            self.fail(now);
+            self.motor.forget_settings();
+            self.doubt_zero();
         }
+    }
+
+    /// Trips the motor as by a fault that the drive reports in one update.
+    fn fail(&mut self, now: Instant) {
         let vitals = Vitals { error: Some(Severity::Fault), ..self.motor.vitals() };
         _ = self.watch.check(&mut self.guard, || vitals, now);
         self.guard.relax_until_armed();
-        self.motor.forget_settings();
-        self.doubt_zero();
     }
 
     /// The drive may have lost its supply.
