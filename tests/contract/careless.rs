@@ -3,7 +3,10 @@
 use super::dji::OneModel;
 use super::*;
 use drivetrain::dji::M3508;
-use drivetrain::motor::{CanDevice, Claim, Edge, Ingest, MotorName, Visitor, WrongSetting};
+use drivetrain::motor::{
+    CanDevice, Capabilities, Capability, Claim, Edge, Ingest, MotorName, Role, Target, Visitor,
+    WrongSetting,
+};
 use drivetrain::sim::contract::{Rule, Violation};
 use drivetrain::time::{Duration, Instant, Tick};
 
@@ -390,5 +393,90 @@ fn the_check_finds_what_a_struct_of_devices_does_not_forward() {
         (Slip::StampsWhenRead, Rule::EdgesWait),
     ] {
         assert_eq!(slipping(slip), Err(rule), "{slip:?}");
+    }
+}
+
+/// What the loop of an own motor gets wrong.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Haste {
+    None,
+    IgnoresTheShare,
+    OpensByItsIntegral,
+    HasNoLimit,
+}
+
+/// A motor whose command is its torque in percent of the largest, 2 Nm.
+struct Hasty(Haste, f32);
+
+impl OwnMotor for Hasty {
+    fn name(&self) -> MotorName {
+        MotorName::new("hasty", 1)
+    }
+    fn claims(&self) -> impl IntoIterator<Item = Claim> {
+        [(0x123, Role::Command), (0x143, Role::Feedback)]
+            .map(|(raw, role)| Claim::new(id(raw), role, self.name()))
+    }
+    fn decode(&mut self, frame: &CanFrame) -> Ingest {
+        if frame.data().len() == 3 { Ingest::Taken } else { Ingest::Unrelated }
+    }
+    fn velocity(&self) -> AngularVelocity {
+        AngularVelocity::ZERO
+    }
+    fn rest(&mut self) -> CanFrame {
+        CanFrame::new(id(0x123), &[0]).unwrap()
+    }
+    fn control(&mut self, Order { target, share, .. }: Order) -> CanFrame {
+        let Target::Torque(torque_nm) = target else { return self.rest() };
+        self.1 += 0.001;
+        let limit = match self.0 {
+            Haste::None => share,
+            Haste::IgnoresTheShare => 1.0,
+            Haste::OpensByItsIntegral => (0.7 + self.1).min(1.0),
+            Haste::HasNoLimit => 10.0 * share,
+        };
+        let effort = (torque_nm / 2.0).clamp(-limit, limit);
+        #[expect(clippy::cast_possible_truncation, reason = "saturates")]
+        let percent = (100.0 * effort) as i8;
+        CanFrame::new(id(0x123), &percent.to_be_bytes()).unwrap()
+    }
+    fn reset(&mut self) {
+        self.1 = 0.0;
+    }
+    fn capabilities(&self) -> Capabilities {
+        Capabilities::of(&[Capability::Torque, Capability::Feedback])
+    }
+}
+
+struct HastySubject(Own<Hasty>, bool);
+
+impl Subject for HastySubject {
+    type Device = Own<Hasty>;
+    fn device(&mut self) -> &mut Own<Hasty> {
+        &mut self.0
+    }
+    fn motors(&self) -> usize {
+        1
+    }
+    fn feedback(&self, _motor: usize) -> Option<CanFrame> {
+        CanFrame::new(id(0x143), &[0, 0, 30])
+    }
+    fn drive(&mut self, share: f32) -> Result<(), TargetError> {
+        self.0.set_torque(2.4 * share)
+    }
+    fn effort(&self, command: &CanFrame) -> Option<f32> {
+        self.1.then(|| f32::from(command.bytes()[0].cast_signed()) / 100.0)
+    }
+}
+
+#[test]
+fn the_check_finds_a_loop_that_drives_at_once_or_without_a_limit() {
+    for (haste, knows_effort, found) in [
+        (Haste::None, true, Ok(RULES)),
+        (Haste::IgnoresTheShare, false, Err(Rule::OpensFromZero)),
+        (Haste::OpensByItsIntegral, true, Err(Rule::OpensFromZero)),
+        (Haste::HasNoLimit, true, Err(Rule::OpensFromZero)),
+    ] {
+        let checked = check_contract(|| HastySubject(Own::new(Hasty(haste, 0.0)), knows_effort));
+        assert_eq!(checked.map_err(|violation| violation.rule), found, "{haste:?}");
     }
 }

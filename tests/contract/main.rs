@@ -32,7 +32,7 @@ mod custom_motor;
 use custom_motor::MyMotor;
 
 const SPEED: PidConfig = PidConfig::new(1.0, 4.0, 0.0);
-const RULES: usize = 28;
+const RULES: usize = 29;
 
 fn velocity(share: f32) -> AngularVelocity {
     AngularVelocity::from_rad_per_s(5.0 * share)

@@ -54,6 +54,13 @@ pub trait Subject {
         *command.bytes() == [0; 8]
     }
 
+    /// Returns the effort that a command asks of its motor, as a share of the largest, -1 to 1; `None`, the default, for a command
+    /// whose effort only the drive knows.
+    fn effort(&self, command: &CanFrame) -> Option<f32> {
+        let _ = command;
+        None
+    }
+
     /// Returns the milliseconds from the loss of feedback to zero output, one tick included.
     fn late_ms(&self) -> u64 {
         11
@@ -64,7 +71,7 @@ pub trait Subject {
         0
     }
 
-    /// Returns the milliseconds after arming until the output range is open.
+    /// Returns the milliseconds after arming until the output range is open; 0 for a range that is open at once.
     fn opening_ms(&self) -> u64 {
         220
     }
@@ -100,6 +107,9 @@ pub enum Rule {
     MissingAreNamed,
     /// With feedback of all motors, arming succeeds, and a target then leads to a command.
     ArmedDrives,
+    /// While the output range opens after arming, commands to one target change; their effort, if known, is below 0.6 in the first quarter, and
+    /// never above 1.
+    OpensFromZero,
     /// Foreign, remote and extended frames are handed back and change nothing (I5).
     ForeignIsUnrelated,
     /// Feedback that is too short is refused and changes nothing (I5).
@@ -193,7 +203,7 @@ impl core::error::Error for Violation {}
 ///     let wheel = bus.attach(Config::new(1)).expect("a free id");
 ///     OneWheel(bus, wheel)
 /// };
-/// assert_eq!(check_contract(make), Ok(28)); // rules
+/// assert_eq!(check_contract(make), Ok(29)); // rules
 /// ```
 ///
 /// # Errors
@@ -208,11 +218,13 @@ type Outcome = Result<(), Violation>;
 const MOST_FRAMES: u32 = 64;
 
 /// The frames between two updates.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
 struct Output {
     frames: u32,
     /// Frames with a command other than rest.
     driving: u32,
+    /// The largest effort.
+    effort: f32,
     /// The last frame.
     last: Option<CanFrame>,
     /// Of all bytes and ids, in order.
@@ -248,11 +260,15 @@ impl<S: Subject> Run<S> {
         Ok(())
     }
 
-    /// Arms, waits until the output range is open, and drives.
-    fn arm_and_open(&mut self, rule: Rule) -> Result<(), Violation> {
+    fn arm(&mut self, rule: Rule) -> Outcome {
         let now = self.now();
         let armed = self.subject.device().arm(now).is_ok();
-        self.expect(armed, rule)?;
+        self.expect(armed, rule)
+    }
+
+    /// Arms, waits until the output range is open, and drives.
+    fn arm_and_open(&mut self, rule: Rule) -> Outcome {
+        self.arm(rule)?;
         for _ in 0..self.subject.opening_ms() {
             // Feedback that stands still while the command changes would be frozen.
             let driven = self.subject.drive(0.0).is_ok();
@@ -337,6 +353,7 @@ impl<S: Subject> Run<S> {
             let own = self.is_command(&frame);
             self.expect(own, Rule::SendsWhatItClaims)?;
             output.driving += u32::from(!self.subject.is_zero(&frame));
+            output.effort = output.effort.max(self.subject.effort(&frame).map_or(0.0, f32::abs));
             output.last = Some(frame);
             let bytes = frame.header().to_be_bytes().into_iter().chain(*frame.bytes());
             // FNV-1a.

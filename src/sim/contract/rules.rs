@@ -10,6 +10,7 @@ pub(super) fn check<S: Subject>(make: &impl Fn() -> S) -> Result<usize, Violatio
     disarmed(Run::new(make()))?;
     missing(Run::new(make()))?;
     armed(Run::driving(make())?)?;
+    opening(Run::new(make()))?;
     rejected(Run::driving(make())?, Run::driving(make())?)?;
     not_fresh(Run::driving(make())?)?;
     late(Run::driving(make())?)?;
@@ -73,15 +74,29 @@ fn missing<S: Subject>(mut run: Run<S>) -> Outcome {
         run.hear(heard);
     }
     run.settle()?;
-    let now = run.now();
-    let armed = run.subject.device().arm(now).is_ok();
-    run.expect(armed, Rule::ArmedDrives)
+    run.arm(Rule::ArmedDrives)
 }
 
 fn armed<S: Subject>(mut run: Run<S>) -> Outcome {
     let output = run.step()?;
     let armed = run.subject.device().is_armed();
     run.expect(armed && output.driving > 0, Rule::ArmedDrives)
+}
+
+fn opening<S: Subject>(mut run: Run<S>) -> Outcome {
+    run.step().and_then(|_| run.settle())?;
+    run.arm(Rule::ArmedDrives)?;
+    let (mut first, opening_ms) = (None, run.subject.opening_ms());
+    for ms in 0..opening_ms {
+        _ = run.subject.drive(1.0);
+        let Output { effort, last, driving, .. } = run.step()?;
+        first = first.or(last.filter(|_| driving > 0));
+        let most = if ms < opening_ms / 4 { 0.6 } else { 1.001 };
+        run.expect(effort <= most, Rule::OpensFromZero)?;
+    }
+    _ = run.subject.drive(1.0);
+    let opened = run.step()?.last;
+    run.expect(opening_ms == 0 || first.is_none() || first != opened, Rule::OpensFromZero)
 }
 
 /// Frames of others, or only similar to a motor's: on one device of two, without any difference.
@@ -333,12 +348,11 @@ fn from_zero<S: Subject>(mut run: Run<S>) -> Outcome {
     for _ in 0..=run.subject.settle_ms() {
         driving += run.step()?.driving;
     }
-    let now = run.now();
-    let armed = run.subject.device().arm(now).is_ok();
+    run.arm(Rule::StartsFromZero)?;
     for _ in 0..20 {
         driving += run.step()?.driving;
     }
-    run.expect(armed && driving == 0, Rule::StartsFromZero)
+    run.expect(driving == 0, Rule::StartsFromZero)
 }
 
 fn deterministic<S: Subject>(mut one: Run<S>, mut other: Run<S>) -> Outcome {
