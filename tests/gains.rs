@@ -5,10 +5,14 @@
 
 use drivetrain::chassis::{Chassis, Differential, Kinematics, Mecanum, MecanumWheels, Omni};
 use drivetrain::control::{PidConfig, WheelTuning};
+use drivetrain::damiao;
 use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, M2006, M3508, Model};
 use drivetrain::geometry::{Twist, Vec2};
+use drivetrain::motor::{AngleDrive, ImpedanceControl, Own};
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::sim::{ChassisConfig, MotorConfig, Simulation, Wheel};
+use drivetrain::sim::{
+    ChassisConfig, DamiaoDrive, DriveShaft, Line, MotorConfig, Sender, Simulation, Wheel,
+};
 use drivetrain::time::Duration;
 use drivetrain::units::{Angle, AngularVelocity};
 use std::fs;
@@ -329,6 +333,67 @@ fn the_gains_of_the_guide_turn_a_gimbal_and_a_loader_and_scale_with_the_inertia(
     assert!(gimbal(0.05, 1.0, 4.0).0 > 9.0 && loader(0.05, 1.0).0 > 30.0);
     let (fast, slow) = (gimbal(0.1, 4.85, 4.0), gimbal(0.1, 4.85, 2.0));
     assert!(fast.0 > 10.0 && slow.0 < 5.0, "{fast:?}, {slow:?}");
+}
+
+/// A step of 90° of a joint whose inertia is so many times the stated one: the farthest beyond the goal in degrees, and after how many ms the
+/// joint stays within 1 degree.
+fn swing(control: ImpedanceControl, inertia: f32) -> (f32, u32) {
+    let joint = Own::new(damiao::Motor::new(damiao::Model::J4340, 1, control).unwrap());
+    let world = Simulation::new(1);
+    let mut drive =
+        DamiaoDrive::new(1, 0x11, [12.5, 10.0, 28.0]).with_shaft(DriveShaft::new(inertia, 0.01));
+    let mut runner = Runner::new(Nb(world.controller()), world.clock(), joint);
+    let (mut beyond, mut outside_ms) = (0.0_f32, 0);
+    for ms in 0..5_000 {
+        world.advance_with(Duration::from_millis(1), |record| {
+            if record.sender == Sender::Controller
+                && let Some(answer) = drive.hear(&record.frame)
+            {
+                world.inject(Line::Can1, answer).unwrap();
+            }
+        });
+        (0..4).for_each(|_| drive.step(0.000_25));
+        runner.poll(16);
+        let Some(tick) = runner.due() else { continue };
+        if ms == 300 {
+            runner.arm(tick).unwrap();
+        }
+        let goal = if ms < 1_000 { 0.0 } else { 90.0 };
+        _ = runner.device_mut().set_angle((), Angle::from_degrees(goal));
+        if ms >= 1_000 {
+            let error = drive.shaft().angle_rad().to_degrees() - goal;
+            beyond = beyond.max(error);
+            if error.abs() > 1.0 {
+                outside_ms = ms - 1_000;
+            }
+        }
+        runner.tick(tick);
+    }
+    (beyond, outside_ms)
+}
+
+#[test]
+fn the_gains_of_a_joint_follow_from_its_inertia() {
+    let page = text("docs/gains.md");
+    assert!(page.contains("speed 30 `J` Nm per rad/s, 112 `J` Nm per rad |"));
+    assert!(page.contains("stiffness 225 `J` Nm/rad, damping 30 `J` Nm s/rad"));
+    let control = ImpedanceControl::new(25.0).unwrap();
+    let position = PidConfig::new(5.0, 0.0, 0.0).with_output_limit(4.0);
+    for inertia in [0.005, 0.02, 0.1] {
+        let speed = PidConfig::new(30.0 * inertia, 112.0 * inertia, 0.0);
+        let loops = control.with_loops(position, speed).unwrap();
+        let gains = control.with_gains(225.0 * inertia, 30.0 * inertia).unwrap();
+        for (control, times, most_degrees, most_ms) in [
+            (loops, 1.0, 0.1, 1_200),
+            (loops, 3.0, 2.5, 1_400),
+            (gains, 1.0, 0.1, 600),
+            (gains, 2.0, 4.0, 700),
+        ] {
+            let (beyond, outside_ms) = swing(control, inertia * times);
+            let found = format!("{inertia} kg m² x {times}: {beyond} degrees, {outside_ms} ms");
+            assert!(beyond < most_degrees && outside_ms < most_ms, "{found}");
+        }
+    }
 }
 
 /// Also on three omni wheels, of which each carries nearly three times as much.

@@ -1101,3 +1101,23 @@ fn rest_that_the_driver_refused_gives_way_to_no_other_frame() {
         assert!(bench.drive.shaft().torque_nm().abs() < 0.003, "after {lost} refused frames");
     }
 }
+
+/// 90° with a stiffness of 8 Nm/rad pass VMAX, 10 rad/s. Without its damper the joint swung 79° beyond its target.
+#[test]
+fn a_damper_still_brakes_a_joint_that_is_faster_than_vmax() {
+    let gains = ImpedanceControl::new(25.0).unwrap().with_gains(8.0, 0.8).unwrap();
+    let mut bench = Bench::new(mit(), 1.0);
+    bench.own = Own::new(Motor::new(Model::J4340, 1, gains).unwrap());
+    let shaft = DriveShaft::new(0.02, 0.0);
+    bench.drive = DamiaoDrive::new(1, 0x11, [12.5, 10.0, 28.0]).with_shaft(shaft);
+    bench.steps(200, |_| {});
+    bench.own.arm(bench.now()).unwrap();
+    let (mut fastest, mut farthest) = (0.0_f32, 0.0_f32);
+    bench.steps(400, |bench| bench.own.set_angle((), Angle::ZERO).unwrap());
+    bench.steps(2_000, |bench| {
+        bench.own.set_angle((), Angle::from_degrees(90.0)).unwrap();
+        fastest = fastest.max(bench.drive.shaft().velocity_rad_per_s());
+        farthest = farthest.max(bench.drive.shaft().angle_rad());
+    });
+    assert!(fastest > 10.0 && farthest.to_degrees() < 92.0, "{fastest} rad/s, {farthest} rad");
+}

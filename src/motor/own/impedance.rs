@@ -13,6 +13,7 @@ use crate::units::{Angle, AngularVelocity};
 /// The limit holds at the last reported angle and velocity: the torque beside is limited first, then the spring,
 /// then the damper. Angle and velocity are sent near enough for gains times the remaining way to keep within the limit. Until the next
 /// command the drive follows its own measurements: a shaft blocked while turning at `v` feels up to `damping * v` more.
+/// At the end of the velocity's range, where the drive may turn faster than it reports, spring and damper are sent as a torque alone.
 /// Stiffness and damping are scaled by the [share](Order::share) of the order, and lowered where a count of the angle or of the
 /// velocity, times the gain, is more than an eighth of the limit.
 ///
@@ -155,15 +156,8 @@ impl ImpedanceControl {
     ) -> Option<Impedance> {
         let (limit, torque_nm) = (self.torque_limit_nm * share, wanted.torque_nm);
         let (per_count, per_count_s) = (count.angle.as_radians(), count.velocity.as_rad_per_s());
-        let end = most.velocity.as_rad_per_s();
-        // A velocity at the end of its range is there or beyond.
-        let is_known = velocity.as_rad_per_s().abs() < end - 0.5 * per_count_s;
-        let damping = if is_known { wanted.damping.min(most.damping) } else { 0.0 };
-        let stiffness =
-            whole(share * wanted.stiffness.min(most.stiffness), per_count, limit, count.stiffness);
-        let damping = whole(share * damping, per_count_s, limit, count.damping);
-        // Angle and velocity are truncated, by the drive that reports them and in the command.
-        let limit = limit - 2.0 * (stiffness * per_count + damping * per_count_s);
+        let stiffness = share * wanted.stiffness.min(most.stiffness);
+        let damping = share * wanted.damping.min(most.damping);
         let at = match angle {
             Some(angle) => angle.as_radians(),
             None if stiffness > 0.0 => return None,
@@ -171,9 +165,21 @@ impl ImpedanceControl {
         };
         let end = most.angle.as_radians();
         let way = limited(wanted.angle.as_radians(), -end, end) - at;
+        let end = most.velocity.as_rad_per_s();
+        let change = limited(wanted.velocity.as_rad_per_s(), -end, end) - velocity.as_rad_per_s();
+        // A velocity at the end of its range is there or beyond: a damper of the drive could pass the limit, a torque cannot.
+        if velocity.as_rad_per_s().abs() >= end - 0.5 * per_count_s {
+            let sum = torque_nm + stiffness * way + damping * change;
+            let torque_nm = limited(sum, -limit, limit);
+            self.effort = torque_nm / self.torque_limit_nm;
+            return Some(Impedance { torque_nm, ..Impedance::FREE });
+        }
+        let stiffness = whole(stiffness, per_count, limit, count.stiffness);
+        let damping = whole(damping, per_count_s, limit, count.damping);
+        // Angle and velocity are truncated, by the drive that reports them and in the command.
+        let limit = limit - 2.0 * (stiffness * per_count + damping * per_count_s);
         let way = within(way, torque_nm, stiffness, limit);
         let spring_nm = torque_nm + stiffness * way;
-        let change = limited(wanted.velocity.as_rad_per_s(), -end, end) - velocity.as_rad_per_s();
         let change = within(change, spring_nm, damping, limit);
         self.effort = (spring_nm + damping * change) / self.torque_limit_nm;
         Some(Impedance {
