@@ -11,8 +11,9 @@ use crate::units::{Angle, AngularVelocity};
 /// within a limit.
 ///
 /// The limit holds at the last reported angle and velocity: the torque beside is limited first, then the spring,
-/// then the damper. Angle and velocity are sent near enough for gains times the remaining way to keep within the limit. Until the next
-/// command the drive follows its own measurements: a shaft blocked while turning at `v` feels up to `damping * v` more.
+/// then the damper, so far from its target a joint turns at most at the limit divided by the damping. Angle and velocity are sent
+/// near enough for gains times the remaining way to keep within the limit. Until the next command the drive follows its own
+/// measurements: a shaft blocked while turning at `v` feels up to `damping * v` more.
 /// At the end of the velocity's range, where the drive may turn faster than it reports, spring and damper are sent as a torque alone.
 /// Stiffness and damping are scaled by the [share](Order::share) of the order, and lowered where a count of the angle or of the
 /// velocity, times the gain, is more than an eighth of the limit.
