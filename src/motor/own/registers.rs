@@ -94,8 +94,9 @@ macro_rules! registers {
                 }
             }
 
-            /// The name in the manual.
-            pub(super) const fn manual(self) -> &'static str {
+            /// Returns the name in the manual of the drive, as errors of a wrong setting print it.
+            #[must_use]
+            pub const fn manual(self) -> &'static str {
                 match self {
                     $(Self::$register => $manual,)+
                 }

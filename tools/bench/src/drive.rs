@@ -147,37 +147,25 @@ impl Drive {
 }
 
 /// The registers of Damiao, by their names.
-const DAMIAO: [damiao::Register; 20] = {
-    use damiao::Register as R;
-    [
-        R::UnderVoltage,
-        R::OverTemperature,
-        R::OverCurrent,
-        R::Acceleration,
-        R::Deceleration,
-        R::MaxSpeed,
-        R::MasterId,
-        R::Id,
-        R::Timeout,
-        R::ControlMode,
-        R::PositionRange,
-        R::VelocityRange,
-        R::TorqueRange,
-        R::SpeedKp,
-        R::SpeedKi,
-        R::PositionKp,
-        R::PositionKi,
-        R::SoftwareVersion,
-        R::SupplyVoltage,
-        R::MotorTemperature,
-    ]
-};
+/// Finds a register by its name in the crate or in the manual of the drive.
+fn found<R: Copy + std::fmt::Debug>(
+    registers: &[R],
+    manual: fn(R) -> &'static str,
+    name: &str,
+) -> Result<R, String> {
+    let names = |register: &R| [format!("{register:?}"), manual(*register).to_owned()];
+    let is_named = |of: &[String; 2]| of.iter().any(|own| own.eq_ignore_ascii_case(name));
+    let register = registers.iter().find(|register| is_named(&names(register)));
+    let all: Vec<_> = registers.iter().map(|register| names(register).join(" = ")).collect();
+    register.copied().ok_or(format!("no register {name}, but {}", all.join(", ")))
+}
 
-fn found<R: Copy + std::fmt::Debug>(registers: &[R], name: &str) -> Result<R, String> {
-    let named = |register: &R| format!("{register:?}");
-    let register = registers.iter().find(|register| named(register).eq_ignore_ascii_case(name));
-    let names: Vec<_> = registers.iter().map(named).collect();
-    register.copied().ok_or(format!("no register {name}, but {}", names.join(", ")))
+fn of_damiao(name: &str) -> Result<damiao::Register, String> {
+    found(damiao::Register::ALL, damiao::Register::manual, name)
+}
+
+fn of_robstride(name: &str) -> Result<robstride::Register, String> {
+    found(robstride::Register::ALL, robstride::Register::manual, name)
 }
 
 /// Registers and ids, of the families that have them.
@@ -190,8 +178,8 @@ impl Drive {
     /// If there is no such register.
     pub(crate) fn read(&mut self, name: &str) -> Result<(), String> {
         match &mut self.kind {
-            Kind::Damiao(own) => own.motor_mut().read(found(&DAMIAO, name)?),
-            Kind::RobStride(own) => own.motor_mut().read(found(robstride::Register::ALL, name)?),
+            Kind::Damiao(own) => own.motor_mut().read(of_damiao(name)?),
+            Kind::RobStride(own) => own.motor_mut().read(of_robstride(name)?),
             _ => {}
         }
         Ok(())
@@ -201,26 +189,26 @@ impl Drive {
     /// If there is no such register, or the value cannot be written there.
     pub(crate) fn write(&mut self, name: &str, value: f32) -> Result<(), String> {
         match &mut self.kind {
-            Kind::Damiao(own) => own.motor_mut().write(found(&DAMIAO, name)?, value).map_err(text),
-            Kind::RobStride(own) => {
-                own.motor_mut().write(found(robstride::Register::ALL, name)?, value).map_err(text)
-            }
+            Kind::Damiao(own) => own.motor_mut().write(of_damiao(name)?, value).map_err(text),
+            Kind::RobStride(own) => own.motor_mut().write(of_robstride(name)?, value).map_err(text),
             _ => Ok(()),
         }
     }
 
     /// The last answer, if it is of this register.
     pub(crate) fn answer(&self, name: &str) -> Option<f32> {
-        let (found, value) = match &self.kind {
+        let (is_its, value) = match &self.kind {
             Kind::Damiao(own) => {
-                own.motor().register().map(|(register, value)| (format!("{register:?}"), value))
+                let (register, value) = own.motor().register()?;
+                (of_damiao(name) == Ok(register), value)
             }
             Kind::RobStride(own) => {
-                own.motor().register().map(|(register, value)| (format!("{register:?}"), value))
+                let (register, value) = own.motor().register()?;
+                (of_robstride(name) == Ok(register), value)
             }
-            _ => None,
-        }?;
-        found.eq_ignore_ascii_case(name).then_some(value)
+            _ => return None,
+        };
+        is_its.then_some(value)
     }
 
     /// Has the drive keep what was written, where it does so only then.
