@@ -72,8 +72,7 @@ impl PowerBuffer {
         // The buffer is the measurement: above the reserve the loop's output is negative.
         let step = TimeStep::of(dt_s);
         let allowance_w = limit_w - self.pid.step(self.reserve_j, energy_j, &step);
-        let integral = self.pid.terms().i;
-        self.pid.keep_integral_within(if integral > 0.0 { limit_w } else { 0.0 });
+        self.pid.keep_integral_between(0.0, limit_w);
         if allowance_w > 0.0 { allowance_w } else { 0.0 }
     }
 }

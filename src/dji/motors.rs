@@ -243,8 +243,8 @@ impl<const N: usize> Motors<N> {
         if after != before {
             outbox.put(slot.place, after);
             // Meanwhile the loop must not wind up.
-            let passed = slot.in_units(after);
-            slot.speed_loop_mut().keep_integral_within(passed);
+            let passed = slot.in_units(after).abs();
+            slot.speed_loop_mut().keep_integral_between(-passed, passed);
         }
     }
 }

@@ -218,7 +218,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
         self.output = asked.max(-limit).min(limit);
         if limit < self.config.limit {
             // The loop knows only the full limit, and would wind up.
-            self.speed.iter_mut().for_each(|speed| speed.keep_integral_within(limit));
+            self.speed.iter_mut().for_each(|speed| speed.keep_integral_between(-limit, limit));
         }
         let output = if self.config.reversed { -self.output } else { self.output };
         let share = output.abs();

@@ -6,10 +6,6 @@ use crate::error::{
 pub(super) const NOT_PLAIN: u16 = 1;
 pub(super) const DERIVATIVE_ON_ERROR: u16 = 1 << 1;
 pub(super) const INCREMENTAL: u16 = 1 << 2;
-/// Set by a refused sample until the next good step: the travel of the measurement in that time is unknown.
-pub(super) const REST_DERIVATIVE: u16 = 1 << 3;
-/// Set by `reset_to` until the next step.
-pub(super) const TRACK_OUTPUT: u16 = 1 << 4;
 
 /// The numbers of a [`PidConfig`] stored by a controller as they are.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,21 +80,20 @@ impl PidConfig {
     ///
     /// Each must be finite and zero or more.
     pub const fn new(kp: f32, ki: f32, kd: f32) -> Self {
-        let parameters = Parameters {
-            kp,
-            ki,
-            kd,
-            output_upper: Self::OFF,
-            output_lower: -Self::OFF,
-            full_rate_below: Self::OFF,
-            no_rate_above: Self::OFF,
-            dead_band: 0.0,
-            slew_per_s: Self::OFF,
-            derivative_time_s: 0.0,
-            drain_time_s: 0.0,
-        };
         Self {
-            parameters,
+            parameters: Parameters {
+                kp,
+                ki,
+                kd,
+                output_upper: Self::OFF,
+                output_lower: -Self::OFF,
+                full_rate_below: Self::OFF,
+                no_rate_above: Self::OFF,
+                dead_band: 0.0,
+                slew_per_s: Self::OFF,
+                derivative_time_s: 0.0,
+                drain_time_s: 0.0,
+            },
             integral_limit: Self::OFF,
             static_gain: 0.0,
             velocity_gain: 0.0,

@@ -9,9 +9,7 @@
 //! ```
 
 use super::Pid;
-use super::config::{
-    DERIVATIVE_ON_ERROR, INCREMENTAL, NOT_PLAIN, Parameters, REST_DERIVATIVE, TRACK_OUTPUT,
-};
+use super::config::{DERIVATIVE_ON_ERROR, INCREMENTAL, NOT_PLAIN, Parameters};
 use crate::control::number::{finite, limited};
 use crate::math;
 use crate::time::TimeStep;
@@ -42,7 +40,7 @@ const _: () = assert!(size_of::<ErrorPid>() <= 72, "one for each motor of a bus"
 impl ErrorPid {
     /// Makes a change, or a step with a given error, as the whole controller does.
     pub(crate) fn as_pid<T>(&mut self, change: impl FnOnce(&mut Pid) -> T) -> T {
-        let mut whole = Pid::of_error(*self);
+        let mut whole = Pid { core: *self, ..Pid::NONE };
         let done = change(&mut whole);
         *self = whole.core;
         done
@@ -69,8 +67,7 @@ impl ErrorPid {
             integral = if is_outward { self.integral } else { integral };
             output = limit_of(self.output_gate).copysign(output);
         }
-        self.keep(output, error, rate, integral);
-        Ok(output)
+        Ok(self.keep(output, error, rate, integral))
     }
 
     /// The law with all options but those of the setpoint, for a finite error.
@@ -91,9 +88,8 @@ impl ErrorPid {
         if size < p.dead_band {
             proportional = 0.0;
             let shrinks = growth * self.integral < 0.0;
-            if !shrinks {
-                growth *= 0.0; // and not simply zero: what is not finite must show
-            }
+            // Not simply zero: what is not finite must show.
+            growth = if shrinks { growth } else { growth * 0.0 };
         }
         let integral = self.integral + growth;
         let pushed = proportional + feed_forward;
@@ -102,8 +98,7 @@ impl ErrorPid {
         let is_slow = way <= p.slew_per_s * step.dt_s || p.slew_per_s >= f32::MAX;
         let is_within = wanted <= p.output_upper && wanted >= p.output_lower;
         if is_slow && is_within && passes(integral, self.integral_limit_gate()) {
-            self.keep(wanted, error, rate, integral);
-            return wanted;
+            return self.keep(wanted, error, rate, integral);
         }
         self.bound(error, rate, pushed, growth, step)
     }
@@ -131,8 +126,7 @@ impl ErrorPid {
         }
         let mut integral = limited(memory + growth, -limit, limit);
         let wanted = others + integral;
-        let has_slew_limit = p.slew_per_s < f32::MAX;
-        let reach = if has_slew_limit { p.slew_per_s * step.dt_s } else { f32::INFINITY };
+        let reach = if p.slew_per_s < f32::MAX { p.slew_per_s * step.dt_s } else { f32::INFINITY };
         let near = limited(wanted, self.output - reach, self.output + reach);
         let output = self.within_output_range(near);
         let excess = wanted - output;
@@ -142,15 +136,16 @@ impl ErrorPid {
         } else if excess * (integral - memory) > 0.0 {
             integral = memory;
         }
-        self.keep(output, error, rate, integral);
-        output
+        self.keep(output, error, rate, integral)
     }
 
-    const fn keep(&mut self, output: f32, error: f32, rate: f32, integral: f32) {
+    /// Ends a step, and returns its output.
+    pub(super) const fn keep(&mut self, output: f32, error: f32, rate: f32, integral: f32) -> f32 {
         self.output = output;
         self.error = error;
         self.rate = rate;
         self.integral = integral;
+        output
     }
 
     /// Tells whether the memory may hold a value.
@@ -163,13 +158,8 @@ impl ErrorPid {
         self.options & NOT_PLAIN == 0
     }
 
-    /// Tells whether the output has limits.
-    pub(crate) const fn is_limited(&self) -> bool {
-        self.parameters.output_upper < f32::MAX
-    }
-
     /// Returns what the output limits leave of `value`.
-    pub(in crate::control) const fn within_output_range(&self, value: f32) -> f32 {
+    pub(crate) const fn within_output_range(&self, value: f32) -> f32 {
         limited(value, self.parameters.output_lower, self.parameters.output_upper)
     }
 
@@ -266,14 +256,13 @@ impl Pid {
     #[inline(never)]
     fn full(&mut self, valid: f32, measured: f32, error: f32, rate: f32, step: &TimeStep) -> f32 {
         let (mut error, mut rate) = (error, rate);
+        let mut rests = self.core.options & REST_DERIVATIVE != 0;
         // Bad arguments, an unknown measurement, a step that is not normal, overflow.
         if !(error + rate).is_finite() {
             if step.is_hold() || !valid.is_finite() || !measured.is_finite() {
                 return self.refuse(!step.is_hold());
             }
-            if self.measurement == UNKNOWN || step.is_frozen() {
-                self.core.options |= REST_DERIVATIVE;
-            }
+            rests |= self.measurement == UNKNOWN || step.is_frozen();
             (error, rate) = (finite(error), finite(rate));
         }
         if self.way > 0.0 {
@@ -287,7 +276,7 @@ impl Pid {
             let way = if self.way > 0.0 { math::shortest(way, self.way) } else { way };
             rate = way * step.per_dt;
         }
-        if self.core.options & REST_DERIVATIVE != 0 {
+        if rests {
             rate = self.core.rate;
             self.core.set_options(self.core.options & !REST_DERIVATIVE);
         }
@@ -320,6 +309,11 @@ impl Pid {
 
 /// The output; or whether the error is known to be finite.
 pub(crate) type Plain = Result<f32, bool>;
+
+/// Set by a refused sample until the next good step: the travel of the measurement in that time is unknown.
+pub(super) const REST_DERIVATIVE: u16 = 1 << 3;
+/// Set by `reset_to` until the next step.
+pub(super) const TRACK_OUTPUT: u16 = 1 << 4;
 
 /// Marks a stored error or measurement as unknown: arithmetic with it never passes a [`gate`].
 pub(super) const UNKNOWN: f32 = f32::INFINITY;

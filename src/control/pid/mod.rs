@@ -8,8 +8,8 @@ pub(crate) use law::ErrorPid;
 
 use crate::control::number::{finite, friction, limited};
 use crate::error::{ConfigError, check};
-use config::{DERIVATIVE_ON_ERROR, INCREMENTAL, REST_DERIVATIVE, TRACK_OUTPUT};
-use law::{CLOSED, UNKNOWN, gate, limit_of};
+use config::{DERIVATIVE_ON_ERROR, INCREMENTAL};
+use law::{CLOSED, REST_DERIVATIVE, TRACK_OUTPUT, UNKNOWN, gate, limit_of};
 
 /// A PID controller, positional or incremental, with the options of its [`PidConfig`].
 ///
@@ -119,38 +119,35 @@ impl Pid {
     /// Names the parameter that is NaN, infinite, negative, zero where zero is invalid, or reversed.
     pub const fn new(config: PidConfig) -> Result<Self, ConfigError> {
         check!(config.validate());
-        let mut pid = Self::of_error(ErrorPid {
+        let mut pid = Self::NONE;
+        pid.store(&config);
+        Ok(pid)
+    }
+
+    /// Knows neither gains nor options, and no step.
+    const NONE: Self = Self {
+        measurement: UNKNOWN,
+        core: ErrorPid {
             error: UNKNOWN,
             rate: 0.0,
             output: 0.0,
             integral: 0.0,
             integral_gate: CLOSED,
             output_gate: CLOSED,
-            parameters: config.parameters,
+            parameters: PidConfig::new(0.0, 0.0, 0.0).parameters,
             options: 0,
             rejected: 0,
-        });
-        pid.store(&config);
-        Ok(pid)
-    }
-
-    /// Adds what a controller knows of its setpoint: nothing yet.
-    const fn of_error(core: ErrorPid) -> Self {
-        Self {
-            measurement: UNKNOWN,
-            core,
-            way: 0.0,
-            tracking_rate: 0.0,
-            static_gain: 0.0,
-            velocity_gain: 0.0,
-        }
-    }
+        },
+        way: 0.0,
+        tracking_rate: 0.0,
+        static_gain: 0.0,
+        velocity_gain: 0.0,
+    };
 
     /// Forgets everything but the configuration and the count of rejected steps: the next call is a first call.
     pub const fn reset(&mut self) {
         self.interrupt();
-        self.core.integral = 0.0;
-        self.core.output = 0.0;
+        self.core.keep(0.0, UNKNOWN, 0.0, 0.0);
         self.core.options &= !TRACK_OUTPUT;
     }
 
@@ -217,10 +214,9 @@ impl Pid {
         self.store(&config);
         let after = self.terms();
         let d = if config.incremental { after.d } else { before.d };
-        let mut change = finite(held - sum(Terms { d, ..after }));
-        if (last - held) * change < 0.0 {
-            change = 0.0; // towards the limit: the memory would be wound up
-        }
+        let change = finite(held - sum(Terms { d, ..after }));
+        // Towards the limit, the memory would be wound up.
+        let change = if (last - held) * change < 0.0 { 0.0 } else { change };
         let limit = if self.core.has_memory() { config.integral_limit } else { 0.0 };
         self.core.integral = limited(self.core.integral + change, -limit, limit);
         Ok(())
@@ -231,8 +227,8 @@ impl Pid {
     pub fn terms(&self) -> Terms {
         let (core, p) = (&self.core, &self.core.parameters);
         let counts = core.error != UNKNOWN && core.error.abs() >= p.dead_band;
-        let is_measured = self.measurement != UNKNOWN;
-        let setpoint = if is_measured { self.measurement + core.error } else { 0.0 };
+        let setpoint =
+            if self.measurement != UNKNOWN { self.measurement + core.error } else { 0.0 };
         Terms {
             p: if counts { p.kp * core.error } else { 0.0 },
             i: core.integral,
@@ -268,14 +264,8 @@ impl Pid {
         self.core.rejected
     }
 
-    /// Takes the part of the last output passed by a limit beyond this loop, and keeps the integral within its size: a
-    /// larger integral would be wound up. NaN counts as zero.
-    pub(crate) const fn keep_integral_within(&mut self, passed: f32) {
-        let most = if passed.is_nan() { 0.0 } else { passed.abs() };
-        self.keep_integral_between(-most, most);
-    }
-
-    /// Keeps the integral within a range of the output around zero.
+    /// Keeps the integral within a range of the output around zero: the part passed by a limit beyond this loop, since a larger
+    /// integral would be wound up.
     pub(crate) const fn keep_integral_between(&mut self, lowest: f32, highest: f32) {
         self.core.integral = limited(self.core.integral, lowest, highest);
     }
@@ -1541,7 +1531,7 @@ mod limited_beyond {
         for _ in 0..1_000 {
             let output = pid.step(1.0, 0.0, &TimeStep::of(0.001));
             if tells {
-                pid.keep_integral_within(output.min(2.0));
+                pid.keep_integral_between(0.0, output.min(2.0));
             }
         }
         pid.step(1.0, 0.0, &TimeStep::of(0.001))
@@ -1554,16 +1544,14 @@ mod limited_beyond {
     }
 
     #[test]
-    fn the_sign_stays_and_a_share_of_nan_removes_the_whole_output() {
+    fn an_integral_within_the_range_stays_as_it_is() {
         let mut pid = Pid::new(PidConfig::new(0.0, 100.0, 0.0)).unwrap();
         for _ in 0..=100 {
             pid.step(-1.0, 0.0, &TimeStep::of(0.001));
         }
-        pid.keep_integral_within(4.0);
-        assert!((pid.terms().i + 4.0).abs() < 1e-6);
-        pid.keep_integral_within(100.0);
-        assert!((pid.terms().i + 4.0).abs() < 1e-6);
-        pid.keep_integral_within(f32::NAN);
-        assert!(pid.terms().i.abs() < 1e-6);
+        for (lowest, highest, kept) in [(-4.0, 4.0, -4.0), (-100.0, 100.0, -4.0), (0.0, 4.0, 0.0)] {
+            pid.keep_integral_between(lowest, highest);
+            assert!((pid.terms().i - kept).abs() < 1e-6);
+        }
     }
 }
