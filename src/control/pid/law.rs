@@ -310,9 +310,9 @@ impl Pid {
 /// The output; or whether the error is known to be finite.
 pub(crate) type Plain = Result<f32, bool>;
 
-/// Set by a refused sample until the next good step: the travel of the measurement in that time is unknown.
+/// Set by a refused sample until the next good step, beside the options: the travel of the measurement in that time is unknown.
 pub(super) const REST_DERIVATIVE: u16 = 1 << 3;
-/// Set by `reset_to` until the next step.
+/// Set by `reset_to` until the next step, beside the options.
 pub(super) const TRACK_OUTPUT: u16 = 1 << 4;
 
 /// Marks a stored error or measurement as unknown: arithmetic with it never passes a [`gate`].

@@ -227,8 +227,8 @@ impl Pid {
     pub fn terms(&self) -> Terms {
         let (core, p) = (&self.core, &self.core.parameters);
         let counts = core.error != UNKNOWN && core.error.abs() >= p.dead_band;
-        let setpoint =
-            if self.measurement != UNKNOWN { self.measurement + core.error } else { 0.0 };
+        let is_measured = self.measurement != UNKNOWN;
+        let setpoint = if is_measured { self.measurement + core.error } else { 0.0 };
         Terms {
             p: if counts { p.kp * core.error } else { 0.0 },
             i: core.integral,
