@@ -14,14 +14,14 @@ use drivetrain::dji::{Bus, Config, Handle, M3508};
 use drivetrain::encoder::GearRatio;
 use drivetrain::geometry::{Body, Twist, Vec2};
 use drivetrain::motor::{
-    Condition, Devices, Edge, Impedance, ImpedanceControl, Own, OwnMotor, VelocityDrive,
+    Condition, Devices, Impedance, ImpedanceControl, MotorName, Own, OwnMotor, VelocityDrive,
 };
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{
     ChassisConfig, DamiaoDrive, DriveShaft, Line, MotorConfig, MotorKey, Sender, Simulation,
     VescDrive, VescMotor, Wheel,
 };
-use drivetrain::time::Duration;
+use drivetrain::time::{Duration, Edge};
 use drivetrain::units::{Angle, AngularVelocity};
 use drivetrain::vesc;
 use std::error::Error;
@@ -166,7 +166,7 @@ struct Seen {
     shooter_rpm: f32,
     /// How long after the fault the shooter was disarmed.
     tripped_ms: Option<u64>,
-    edges: Vec<Edge>,
+    edges: Vec<Edge<Condition, MotorName>>,
 }
 
 fn simulate() -> Result<Seen, Box<dyn Error>> {

@@ -7,11 +7,11 @@ use drivetrain::dji::{Bus, Config, Gm6020Current, Gm6020Voltage, Handle, M3508, 
 use drivetrain::encoder::{GearRatio, Position};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    ArmError, CanDevice, Condition, Edge, HealthConfig, Ingest, Link, Measured, Reaction,
+    ArmError, CanDevice, Condition, HealthConfig, Ingest, Link, Measured, MotorName, Reaction,
     TargetError,
 };
 use drivetrain::runner::{EmergencyStop, Nb, Runner};
-use drivetrain::time::{Duration, Instant, ManualClock, Tick};
+use drivetrain::time::{Duration, Edge, Instant, ManualClock, Tick};
 use drivetrain::units::{Angle, AngularVelocity, Current, Voltage};
 use embedded_can::ErrorKind;
 
@@ -55,7 +55,11 @@ fn armed(config: Config<M3508>) -> (Bus, Handle<M3508>) {
 }
 
 /// Feeds one frame a millisecond with the error code that `code` gives, and returns the edges of each update.
-fn edges_of_errors(bus: &mut Bus, to_ms: u64, code: impl Fn(u64) -> u8) -> Vec<(u64, Edge)> {
+fn edges_of_errors(
+    bus: &mut Bus,
+    to_ms: u64,
+    code: impl Fn(u64) -> u8,
+) -> Vec<(u64, Edge<Condition, MotorName>)> {
     let mut edges = Vec::new();
     for ms in 2..to_ms {
         let error = CanFrame::standard(0x201, [0, 0, 0, 0, 0, 0, 25, code(ms)]).unwrap();
@@ -567,7 +571,9 @@ fn codes_that_take_turns_do_not_flood() {
     let (mut bus, _) = armed(at_once(1));
     let edges = edges_of_errors(&mut bus, 1_200, |ms| if ms.is_multiple_of(2) { 3 } else { 8 });
     assert!(edges.len() <= 4 * 1_200 / 12, "{} edges in 1200 ms", edges.len());
-    let fault = |edge: &&(u64, Edge)| edge.1.condition == Condition::Fault && edge.1.began;
+    let fault = |edge: &&(u64, Edge<Condition, MotorName>)| {
+        edge.1.condition == Condition::Fault && edge.1.began
+    };
     assert!(edges.iter().any(|edge| fault(&edge)));
 }
 

@@ -118,7 +118,7 @@ fn drive(seed: u64, seconds: u64) -> Outcome {
         }
         runner.tick(tick);
         while let Some(edge) = runner.device_mut().next_edge() {
-            let motor = story.motors[usize::from(edge.motor.id()) - 1];
+            let motor = story.motors[usize::from(edge.source.id()) - 1];
             let health = runner.device().health(motor).unwrap();
             // Three lost frames in a row at speed may leave a doubt, and then it has to be told. They are a gap of 4 ms,
             // less what the poll stamped the frame before them too late: half a millisecond, and what others delay it.

@@ -50,7 +50,7 @@ impl Pilot for Plan<'_> {
     fn report(&mut self, why: ArmError) {
         self.refused.borrow_mut().push(why.to_string());
     }
-    fn note(&mut self, _: Edge) {}
+    fn note(&mut self, _: Edge<Condition, MotorName>) {}
 }
 
 /// Runs the robot; returns the milliseconds in which a wheel was commanded, as spans, and the refusals.

@@ -2,7 +2,7 @@
 
 #![cfg(test)]
 
-use drivetrain::time::{ConditionEdge, Duration, Instant};
+use drivetrain::time::{Duration, Edge, Instant};
 use drivetrain::wire::dbus::{Dbus, Remote, Switch};
 use drivetrain::wire::hipnuc::{Imu, MAX_FRAME};
 use drivetrain::wire::host_link::{COMMAND_LENGTH, HostCommand, Reset};
@@ -13,12 +13,12 @@ fn ms(ms: u64) -> Instant {
     Instant::START + Duration::from_millis(ms)
 }
 
-const fn heard(at: Instant) -> ConditionEdge<Silence> {
-    ConditionEdge { condition: Silence, began: false, at }
+const fn heard(at: Instant) -> Edge<Silence> {
+    Edge { source: (), condition: Silence, began: false, at }
 }
 
-const fn lost(at: Instant) -> ConditionEdge<Silence> {
-    ConditionEdge { condition: Silence, began: true, at }
+const fn lost(at: Instant) -> Edge<Silence> {
+    Edge { source: (), condition: Silence, began: true, at }
 }
 
 #[test]

@@ -5,7 +5,7 @@
 
 use drivetrain::chassis::CapacitorPlan;
 use drivetrain::frame::CanFrame;
-use drivetrain::time::{ConditionEdge, Duration, Instant};
+use drivetrain::time::{Duration, Edge, Instant};
 use drivetrain::wire::dbus::Keys;
 use drivetrain::wire::referee::{
     MAX_FRAME, PowerHeat, Referee, RefereeMessage, RobotState, ShotData, encode,
@@ -151,12 +151,12 @@ fn ms(ms: u64) -> Instant {
     Instant::START + Duration::from_millis(ms)
 }
 
-const fn heard(at: Instant) -> ConditionEdge<Silence> {
-    ConditionEdge { condition: Silence, began: false, at }
+const fn heard(at: Instant) -> Edge<Silence> {
+    Edge { source: (), condition: Silence, began: false, at }
 }
 
-const fn lost(at: Instant) -> ConditionEdge<Silence> {
-    ConditionEdge { condition: Silence, began: true, at }
+const fn lost(at: Instant) -> Edge<Silence> {
+    Edge { source: (), condition: Silence, began: true, at }
 }
 
 fn robot(limit_w: u16) -> Vec<u8> {

@@ -2,8 +2,8 @@
 
 use crate::motors::{COUNT, FACTS, Motor, OPENING_US, Target};
 use drivetrain::dji::Bus;
-use drivetrain::motor::{CanDevice, Condition, Conditions, Edge, Link, Timeouts};
-use drivetrain::time::{Instant, Tick};
+use drivetrain::motor::{CanDevice, Condition, Conditions, Link, MotorName, Timeouts};
+use drivetrain::time::{Edge, Instant, Tick};
 
 /// Feedback is late above this age, and targets are old above the other: the values of the documentation.
 pub const LATE_US: u64 = 10_000;
@@ -178,15 +178,15 @@ impl Alone {
     }
 
     /// The edges that were not read yet, in an order that does not depend on how many there were.
-    pub fn edges(&mut self) -> Vec<Edge> {
+    pub fn edges(&mut self) -> Vec<Edge<Condition, MotorName>> {
         sorted(core::iter::from_fn(|| self.bus.next_edge()).collect())
     }
 }
 
 /// Edges in the order of motors and conditions.
-pub fn sorted(mut edges: Vec<Edge>) -> Vec<Edge> {
+pub fn sorted(mut edges: Vec<Edge<Condition, MotorName>>) -> Vec<Edge<Condition, MotorName>> {
     assert!(edges.len() <= 2 * 15 * COUNT, "an edge is told again and again");
-    edges.sort_by_key(|edge| (edge.motor.to_string(), edge.condition, edge.began));
+    edges.sort_by_key(|edge| (edge.source.to_string(), edge.condition, edge.began));
     edges
 }
 

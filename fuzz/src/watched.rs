@@ -29,10 +29,10 @@ use crate::motors::{COUNT, FACTS, INTEGRATOR, Motor, Target};
 use drivetrain::dji::{Bus, Counters};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    ArmError, CanDevice, Claim, Condition, Devices, Edge, Ingest, Link, MotorName, TargetError,
-    Timeouts, Visitor, WrongSetting,
+    ArmError, CanDevice, Claim, Condition, Devices, Ingest, Link, MotorName, TargetError, Timeouts,
+    Visitor, WrongSetting,
 };
-use drivetrain::time::TimeStep;
+use drivetrain::time::{Edge, TimeStep};
 use drivetrain::time::{Instant, Tick};
 use std::collections::VecDeque;
 
@@ -60,7 +60,7 @@ pub struct Watched {
     taken_out: u32,
     given_back: u32,
     wire: [Wire; COUNT],
-    edges: VecDeque<Edge>,
+    edges: VecDeque<Edge<Condition, MotorName>>,
     /// The times of the edges that wait need not be those of the motors alone: one left, and the room of its edges is
     /// not free yet; or there was no update that told the time.
     untimed: bool,
@@ -393,10 +393,13 @@ impl Watched {
     /// Reads every edge that waits: each motor's are those of the motor alone, none lost and none told twice. With more
     /// than the journal holds, their times are not.
     fn read_edges(&mut self) {
-        let edges: Vec<Edge> = core::iter::from_fn(|| self.bus.next_edge()).collect();
+        let edges: Vec<Edge<Condition, MotorName>> =
+            core::iter::from_fn(|| self.bus.next_edge()).collect();
         let untimed = core::mem::replace(&mut self.untimed, self.updated.is_none());
         let timed = edges.len() <= 12 && !untimed;
-        let known = |edge: &Edge| (edge.condition, edge.began, timed.then_some(edge.at));
+        let known = |edge: &Edge<Condition, MotorName>| {
+            (edge.condition, edge.began, timed.then_some(edge.at))
+        };
         for alone in &mut self.alone {
             let same = alone.edges();
             let Some(name) = alone
@@ -408,7 +411,7 @@ impl Watched {
             if alone.doubted.is_some() {
                 continue;
             }
-            let mine = sorted(edges.iter().filter(|edge| edge.motor == name.1).copied().collect());
+            let mine = sorted(edges.iter().filter(|edge| edge.source == name.1).copied().collect());
             assert!(mine.iter().map(known).eq(same.iter().map(known)), "I8: {mine:?} and {same:?}");
         }
         self.edges.extend(edges);
@@ -593,7 +596,7 @@ impl CanDevice for Watched {
         self.bus.second_master()
     }
 
-    fn next_edge(&mut self) -> Option<Edge> {
+    fn next_edge(&mut self) -> Option<Edge<Condition, MotorName>> {
         if self.edges.is_empty() {
             self.read_edges();
         }

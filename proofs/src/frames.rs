@@ -141,7 +141,7 @@ extern "C" fn edges(bus: &mut Bus, told: &mut [u32; 4]) {
     while let Some(edge) = bus.next_edge() {
         let is_rival = edge.began && edge.condition == Condition::SecondMaster;
         count += 1;
-        rivals |= u32::from(is_rival) << edge.motor.id();
+        rivals |= u32::from(is_rival) << edge.source.id();
         let at = edge.at.as_micros() as u32;
         (earliest, latest) = (earliest.min(at), latest.max(at));
     }

@@ -5,10 +5,10 @@ use super::slot::{Slot, health};
 use super::{AnyHandle, Bus, Handle, Model};
 use crate::frame::CanFrame;
 use crate::motor::{
-    AngleDrive, CanDevice, Capabilities, Claim, Edge, Ingest, Link, MotorName, Role, TargetError,
-    VelocityDrive, WrongSetting,
+    AngleDrive, CanDevice, Capabilities, Claim, Condition, Ingest, Link, MotorName, Role,
+    TargetError, VelocityDrive, WrongSetting,
 };
-use crate::time::{Instant, Tick};
+use crate::time::{Edge, Instant, Tick};
 use crate::units::{Angle, AngularVelocity};
 
 impl<B, const N: usize> CanDevice for Bus<B, N> {
@@ -66,7 +66,7 @@ impl<B, const N: usize> CanDevice for Bus<B, N> {
         attach::rival_among(self.motors.slots.iter())
     }
 
-    fn next_edge(&mut self) -> Option<Edge> {
+    fn next_edge(&mut self) -> Option<Edge<Condition, MotorName>> {
         Self::next_edge(self)
     }
 

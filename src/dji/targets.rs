@@ -6,9 +6,10 @@ use crate::control::PidConfig;
 use crate::encoder::Position;
 use crate::error::ConfigError;
 use crate::motor::{
-    ArmError, Capabilities, Conditions, Devices, Edge, Health, Link, Measured, TargetError,
+    ArmError, Capabilities, Condition, Conditions, Devices, Health, Link, Measured, MotorName,
+    TargetError,
 };
-use crate::time::Instant;
+use crate::time::{Edge, Instant};
 use crate::units::{Angle, AngularVelocity, Current, Voltage};
 
 /// State, health and arming.
@@ -72,8 +73,7 @@ impl<B, const N: usize> Bus<B, N> {
     /// # Examples
     /// ```
     /// use drivetrain::dji::{Bus, Config, M3508};
-    /// use drivetrain::motor::Condition;
-    /// use drivetrain::time::{Instant, Tick};
+    /// use drivetrain::{motor::Condition, time::{Instant, Tick}};
     ///
     /// let mut bus = Bus::new();
     /// let wheel = bus.attach(Config::<M3508>::new(2))?;
@@ -82,13 +82,13 @@ impl<B, const N: usize> Bus<B, N> {
     ///     bus.update(Tick::new(Instant::from_micros(millis * 1_000), 0.001));
     /// }
     /// let edge = bus.next_edge().ok_or("nothing happened")?;
-    /// assert_eq!((edge.motor.id(), edge.condition, edge.began), (2, Condition::Late, true));
+    /// assert_eq!((edge.source.id(), edge.condition, edge.began), (2, Condition::Late, true));
     /// assert_eq!(edge.at.as_micros() / 1_024, 12_000 / 1_024); // the first update after 10 ms
     /// assert_eq!(bus.next_edge(), None);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[inline]
-    pub fn next_edge(&mut self) -> Option<Edge> {
+    pub fn next_edge(&mut self) -> Option<Edge<Condition, MotorName>> {
         if self.motors.guard.journal().is_empty() {
             None
         } else {

@@ -9,8 +9,8 @@ use super::outbox::Outbox;
 use super::slot::{Slot, Surroundings, gap, health};
 use super::{CommandFrame, Feedback};
 use crate::frame::CanFrame;
-use crate::motor::{Ages, Edge, Hold, Ingest, Malformed, Rival, Traffic, elapsed};
-use crate::time::Instant;
+use crate::motor::{Ages, Condition, Hold, Ingest, Malformed, MotorName, Rival, Traffic, elapsed};
+use crate::time::{Edge, Instant};
 
 /// Takes any frame.
 #[inline]
@@ -267,7 +267,9 @@ fn hear_command<const N: usize>(motors: &mut Motors<N>, outbox: &Outbox, id: u32
 
 /// Takes the oldest unread edge.
 #[inline(never)]
-pub(super) fn take_edge<const N: usize>(motors: &mut Motors<N>) -> Option<Edge> {
+pub(super) fn take_edge<const N: usize>(
+    motors: &mut Motors<N>,
+) -> Option<Edge<Condition, MotorName>> {
     let updated = motors.guard.updated();
     while let Some(entry) = motors.guard.journal_mut().pop() {
         let at = motors.guard.journal().time_of(&entry, updated);
@@ -275,7 +277,7 @@ pub(super) fn take_edge<const N: usize>(motors: &mut Motors<N>) -> Option<Edge> 
         let Some(motor) = slot.name() else { continue };
         let (condition, began) = (entry.condition, entry.began);
         if slot.guard.latch_mut().take(condition, began) {
-            return Some(Edge { motor, condition, began, at });
+            return Some(Edge { source: motor, condition, began, at });
         }
     }
     let at = motors.guard.journal().last_time(updated);
@@ -283,7 +285,7 @@ pub(super) fn take_edge<const N: usize>(motors: &mut Motors<N>) -> Option<Edge> 
         let motor = slot.name()?;
         let (condition, began) = slot.guard.latch().next()?;
         slot.guard.latch_mut().take(condition, began);
-        Some(Edge { motor, condition, began, at })
+        Some(Edge { source: motor, condition, began, at })
     });
     if edge.is_none() {
         motors.guard.journal_mut().clear();

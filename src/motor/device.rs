@@ -1,8 +1,8 @@
 //! A device, and actions on every device of several: one visitor for each action.
 
-use super::{Claim, Devices, Edge, Missing, MotorName, Role, WrongSetting};
+use super::{Claim, Condition, Devices, Missing, MotorName, Role, WrongSetting};
 use crate::frame::CanFrame;
-use crate::time::{Instant, Tick};
+use crate::time::{Edge, Instant, Tick};
 use core::ops::Range;
 use embedded_can::Frame;
 
@@ -28,7 +28,7 @@ use embedded_can::Frame;
 ///     // fn faulty(&self) -> impl Iterator<Item = MotorName>
 ///     fn wrong_setting(&self) -> Option<WrongSetting> { None }
 ///     fn second_master(&self) -> Option<Claim> { None }
-///     fn next_edge(&mut self) -> Option<Edge> { None }
+///     fn next_edge(&mut self) -> Option<Edge<Condition, MotorName>> { None }
 ///     fn ask(&mut self) -> bool { true }
 ///     fn engage(&mut self, now: Instant) {}
 ///     fn disarm(&mut self) {}
@@ -81,7 +81,7 @@ pub trait CanDevice {
     /// Returns the oldest unread edge of a motor.
     ///
     /// Edges wait until read, so the interval between calls is free.
-    fn next_edge(&mut self) -> Option<Edge>;
+    fn next_edge(&mut self) -> Option<Edge<Condition, MotorName>>;
 
     /// Takes a request to arm; `false` if the request does not count: after a trip, when another request or the trip lies
     /// less than 100 ms of updates back.
@@ -345,7 +345,7 @@ impl Visitor for Standing {
     }
 }
 
-pub(super) struct Read(pub(super) Option<Edge>);
+pub(super) struct Read(pub(super) Option<Edge<Condition, MotorName>>);
 
 impl Visitor for Read {
     #[inline]

@@ -4,9 +4,9 @@ use super::device::{
     Ask, Back, ClearStop, Disarm, Engage, Nth, Obstacles, Offer, Parts, PutBack, Read, Rival,
     Search, Standing, Stop, Superseded, Trip, Update, Visitor,
 };
-use super::{ArmError, Claim, Edge, Ingest, Missing};
+use super::{ArmError, Claim, Condition, Ingest, Missing, MotorName};
 use crate::frame::CanFrame;
-use crate::time::{Instant, Tick};
+use crate::time::{Edge, Instant, Tick};
 
 /// One [`CanDevice`](super::CanDevice) or several: the unit driven by a runner, an async task or a test.
 ///
@@ -139,7 +139,7 @@ pub trait Devices {
     }
 
     /// Returns the oldest unread edge of a motor; of several devices, from the first device with an edge.
-    fn next_edge(&mut self) -> Option<Edge> {
+    fn next_edge(&mut self) -> Option<Edge<Condition, MotorName>> {
         let mut read = Read(None);
         self.visit(&mut read);
         read.0

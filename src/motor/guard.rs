@@ -1,10 +1,8 @@
 //! Rules of a motor that is a device by itself.
 
 use super::safety::{DeviceGuard, MotorGuard, OPENING, age};
-use crate::motor::{
-    Condition, Conditions, Edge, Health, Latch, Link, MotorName, TargetError, Timeouts,
-};
-use crate::time::{Duration, Instant};
+use crate::motor::{Condition, Conditions, Health, Latch, Link, MotorName, TargetError, Timeouts};
+use crate::time::{Duration, Edge, Instant};
 
 /// Decides whether one motor may be driven: for motors outside the families of this crate.
 ///
@@ -349,18 +347,18 @@ impl Guard {
     /// assert_eq!(guard.next_edge(MotorName::new("mine", 1)), None);
     /// # Ok::<(), &str>(())
     /// ```
-    pub fn next_edge(&mut self, motor: MotorName) -> Option<Edge> {
+    pub fn next_edge(&mut self, motor: MotorName) -> Option<Edge<Condition, MotorName>> {
         let now = self.device.updated();
         while let Some(entry) = self.device.journal_mut().pop() {
             if self.motor.latch_mut().take(entry.condition, entry.began) {
                 let at = self.device.journal().time_of(&entry, now);
                 let (condition, began) = (entry.condition, entry.began);
-                return Some(Edge { motor, condition, began, at });
+                return Some(Edge { source: motor, condition, began, at });
             }
         }
         let (condition, began) = self.motor.latch().next()?;
         self.motor.latch_mut().take(condition, began);
-        Some(Edge { motor, condition, began, at: self.device.journal().last_time(now) })
+        Some(Edge { source: motor, condition, began, at: self.device.journal().last_time(now) })
     }
 
     /// Returns the part of a motor's health that the guard holds.

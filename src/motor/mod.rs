@@ -21,7 +21,7 @@
 //! | [`ArmError`], [`TargetError`] | why nothing moves |
 //! | [`OwnMotor`], [`Order`], [`Own`], [`Guard`], [`Vitals`] | a motor of your own, and the rules that make it safe |
 //! | [`StopHoming`] | finds the zero of a shaft at a mechanical stop |
-//! | [`Condition`], [`Edge`], [`Health`] | what is wrong with a motor, each change of it, and all of it in a line |
+//! | [`Condition`], [`Edge`](crate::time::Edge), [`Health`] | what is wrong with a motor, each change of it, and all of it in a line |
 //! | [`HealthConfig`] | what is looked for, and what follows |
 //! | [`BusLoad`] | how full the bus is |
 //!
@@ -52,7 +52,7 @@ pub use device::{CanDevice, Ingest, Malformed, Visitor};
 pub use devices::Devices;
 pub use drive::{AngleDrive, Measured, OneOf, TargetError, VelocityDrive};
 pub use guard::Guard;
-pub use health::{Condition, Conditions, Edge, Health, HealthConfig, Reaction};
+pub use health::{Condition, Conditions, Health, HealthConfig, Reaction};
 pub(crate) use health::{Journal, Latch, Monitor, Rival, Sample, Traffic, elapsed};
 pub use homing::{HomingStep, ShaftState, StopHoming};
 pub use link::{Link, Timeouts};

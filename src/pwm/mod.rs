@@ -21,7 +21,7 @@
 //!
 //! The motors follow the rules of all motors here, by the same [`Guard`](crate::motor::Guard): disarmed at the start; a
 //! target that is old, NaN or infinite, a bad time step, time that stands or goes back, lost feedback and an emergency
-//! stop give the safe output. Each change is an [`Edge`](crate::motor::Edge), pending in `next_edge`. The motors are not
+//! stop give the safe output. Each change is an [`Edge`](crate::time::Edge), pending in `next_edge`. The motors are not
 //! [`Devices`](crate::motor::Devices), so the program calls `update` in each tick itself. With
 //! [`VelocityDrive`](crate::motor::VelocityDrive) they drive a chassis like any other motor.
 //!

@@ -1,9 +1,9 @@
 use crate::error::ConfigError;
 use crate::motor::{
-    ArmError, Capabilities, Capability, Condition, Conditions, Edge, Guard, Health, MotorName,
-    OPENING, TargetError, Timeouts, VelocityDrive,
+    ArmError, Capabilities, Capability, Condition, Conditions, Guard, Health, MotorName, OPENING,
+    TargetError, Timeouts, VelocityDrive,
 };
-use crate::time::{Duration, Instant, Tick, TimeStep};
+use crate::time::{Duration, Edge, Instant, Tick, TimeStep};
 use crate::units::AngularVelocity;
 use embedded_hal::pwm::SetDutyCycle;
 
@@ -321,7 +321,7 @@ impl<P: SetDutyCycle> RcPwm<P> {
 
     /// Returns the oldest unread edge. No edge is lost, however late the reading; while an edge waits, the same change
     /// is not noted again.
-    pub fn next_edge(&mut self) -> Option<Edge> {
+    pub fn next_edge(&mut self) -> Option<Edge<Condition, MotorName>> {
         self.guard.next_edge(self.config.name)
     }
 

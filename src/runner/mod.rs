@@ -15,7 +15,7 @@
 //! pending frames implements [`AbortPending`], and [`NbAbort`] then leaves no frame older than one period.
 //!
 //! # Supervision
-//! A bus down or silent, overruns and a standing clock are latched as [`ConditionEdge`](crate::time::ConditionEdge)s
+//! A bus down or silent, overruns and a standing clock are latched as [`Edge`](crate::time::Edge)s
 //! beside those of the motors; [`Runner::next_edge`] returns these edges. [`Runner::heartbeat`] is for the hardware watchdog,
 //! the only remedy when the loop itself stops.
 //!

@@ -2,7 +2,7 @@
 
 use super::{BusCondition, Port, Runner, Statistics};
 use crate::motor::{ArmError, Ask, BusLoad, Devices};
-use crate::time::{Clock, ConditionEdge, Duration, Tick, Ticker};
+use crate::time::{Clock, Duration, Edge, Tick, Ticker};
 use core::sync::atomic::{AtomicBool, Ordering};
 use embedded_can::ErrorKind;
 
@@ -224,12 +224,12 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// let log: Vec<String> = core::iter::from_fn(|| runner.next_edge()).map(|edge| edge.to_string()).collect();
     /// assert_eq!(log, ["tick overrun began at 1000000 us", "tick overrun ended at 2000000 us"]);
     /// ```
-    pub fn next_edge(&mut self) -> Option<ConditionEdge<BusCondition>> {
+    pub fn next_edge(&mut self) -> Option<Edge<BusCondition>> {
         self.watch.next_edge()
     }
 
     /// Takes all unread edges, the oldest first; see [`next_edge`](Self::next_edge).
-    pub fn edges(&mut self) -> impl Iterator<Item = ConditionEdge<BusCondition>> + '_ {
+    pub fn edges(&mut self) -> impl Iterator<Item = Edge<BusCondition>> + '_ {
         core::iter::from_fn(|| self.next_edge())
     }
 

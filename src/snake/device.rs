@@ -4,9 +4,9 @@ use super::slot::{Slot, health};
 use super::{Joints, schedule};
 use crate::frame::CanFrame;
 use crate::motor::{
-    CanDevice, Claim, Devices, Edge, Guard, Ingest, MotorName, Role, Visitor, WrongSetting,
+    CanDevice, Claim, Condition, Devices, Guard, Ingest, MotorName, Role, Visitor, WrongSetting,
 };
-use crate::time::{Instant, Tick};
+use crate::time::{Edge, Instant, Tick};
 use embedded_can::StandardId;
 
 impl CanDevice for Joints {
@@ -65,7 +65,7 @@ impl CanDevice for Joints {
         Some(Claim::new(id, Role::Command, slot.name()?))
     }
 
-    fn next_edge(&mut self) -> Option<Edge> {
+    fn next_edge(&mut self) -> Option<Edge<Condition, MotorName>> {
         Self::next_edge(self)
     }
 

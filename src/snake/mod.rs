@@ -38,7 +38,7 @@
 //! stays disabled, is detected ([`State::resets`]), and waits to be armed.
 //!
 //! # Conditions
-//! Every change is an [`Edge`](crate::motor::Edge) with its time, latched until [`Joints::next_edge`] reads it. [`Joints::health`] is the
+//! Every change is an [`Edge`](crate::time::Edge) with its time, latched until [`Joints::next_edge`] reads it. [`Joints::health`] is the
 //! line for a log.
 //!
 //! | condition | holds while | the joint |

@@ -5,7 +5,10 @@ use super::model::to_pulses;
 use super::slot::{Slot, health};
 use super::{AttachError, Config, Joints, PULSES_PER_TURN, Register, Reply};
 use crate::encoder::Position;
-use crate::motor::{Capabilities, Capability, Conditions, Edge, Health, TargetError};
+use crate::motor::{
+    Capabilities, Capability, Condition, Conditions, Health, MotorName, TargetError,
+};
+use crate::time::Edge;
 use crate::units::AngularVelocity;
 
 /// Targets. Each replaces the previous one, works in RAM only, and counts until the command deadline
@@ -198,12 +201,12 @@ impl Joints {
     /// _ = joints.ingest(&reply, at_ms(1));
     /// (2..50).for_each(|ms| joints.update(Tick::new(at_ms(ms), 0.001)));
     /// let edge = joints.next_edge().ok_or("nothing happened")?;
-    /// assert_eq!((edge.motor.id(), edge.condition, edge.began), (3, Condition::Late, true));
+    /// assert_eq!((edge.source.id(), edge.condition, edge.began), (3, Condition::Late, true));
     /// assert_eq!(edge.at.as_micros() / 1_024, 42_000 / 1_024); // the first update after 40 ms
     /// assert_eq!(joints.next_edge(), None);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn next_edge(&mut self) -> Option<Edge> {
+    pub fn next_edge(&mut self) -> Option<Edge<Condition, MotorName>> {
         let waiting = self.slots.iter_mut().filter(|slot| health::next_edge_at(slot).is_some());
         health::next_edge(waiting.min_by_key(|slot| health::next_edge_at(slot))?)
     }

@@ -38,7 +38,7 @@
 use super::deframer::count;
 use super::receiver::Deadline;
 use super::{Counts, Silence};
-use crate::time::{ConditionEdge, Duration, Instant};
+use crate::time::{Duration, Edge, Instant};
 
 /// The length of a frame in bytes.
 pub const FRAME_LENGTH: usize = 18;
@@ -161,7 +161,7 @@ impl Dbus {
 
     /// Returns the oldest unread beginning or end of silence.
     #[must_use]
-    pub fn edge(&mut self, now: Instant) -> Option<ConditionEdge<Silence>> {
+    pub fn edge(&mut self, now: Instant) -> Option<Edge<Silence>> {
         self.deadline.edge(now)
     }
 

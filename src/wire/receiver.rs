@@ -1,7 +1,7 @@
 //! Receivers of a byte stream, and the deadline of its content.
 
 use super::{Counts, Decode, Deframer};
-use crate::time::{ConditionEdge, Duration, Instant};
+use crate::time::{Duration, Edge, Instant};
 
 /// A [`Deframer`] that keeps its latest frame, and discards the frame when no new frame came in time.
 ///
@@ -80,7 +80,7 @@ impl<F: Decode + Copy, const N: usize> Receiver<F, N> {
 
     /// Returns the oldest unread beginning or end of silence.
     #[must_use]
-    pub fn edge(&mut self, now: Instant) -> Option<ConditionEdge<Silence>> {
+    pub fn edge(&mut self, now: Instant) -> Option<Edge<Silence>> {
         self.deadline.edge(now)
     }
 
@@ -109,10 +109,11 @@ impl<F: Decode + Copy, const N: usize> Receiver<F, N> {
 ///
 /// # Examples
 /// ```
-/// use drivetrain::time::{ConditionEdge, Instant};
+/// use drivetrain::time::{Edge, Instant};
 /// use drivetrain::wire::Silence;
 ///
-/// let edge = ConditionEdge { condition: Silence, began: true, at: Instant::from_micros(101_000) };
+/// let at = Instant::from_micros(101_000);
+/// let edge = Edge { source: (), condition: Silence, began: true, at };
 /// assert_eq!(edge.to_string(), "silence began at 101000 us");
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -137,7 +138,7 @@ pub(super) struct Deadline {
     met: Instant,
     live: bool,
     losses: u32,
-    pending: [Option<ConditionEdge<Silence>>; 2],
+    pending: [Option<Edge<Silence>>; 2],
 }
 
 impl Deadline {
@@ -170,7 +171,7 @@ impl Deadline {
     }
 
     /// Returns the oldest unread edge.
-    pub(super) fn edge(&mut self, now: Instant) -> Option<ConditionEdge<Silence>> {
+    pub(super) fn edge(&mut self, now: Instant) -> Option<Edge<Silence>> {
         self.expire(now);
         let [first, second] = self.pending;
         self.pending = [second, None];
@@ -194,7 +195,7 @@ impl Deadline {
         self.latch(edge(true, at));
     }
 
-    fn latch(&mut self, edge: ConditionEdge<Silence>) {
+    fn latch(&mut self, edge: Edge<Silence>) {
         self.pending = match self.pending {
             [None, _] => [Some(edge), None],
             [first, None] => [first, Some(edge)],
@@ -204,8 +205,8 @@ impl Deadline {
 }
 
 /// Beginning or end of silence.
-const fn edge(began: bool, at: Instant) -> ConditionEdge<Silence> {
-    ConditionEdge { condition: Silence, began, at }
+const fn edge(began: bool, at: Instant) -> Edge<Silence> {
+    Edge { source: (), condition: Silence, began, at }
 }
 
 #[cfg(test)]
@@ -263,7 +264,7 @@ mod tests {
         assert_eq!(deadline.losses(), 98 + 1);
     }
 
-    fn is_heard(edge: ConditionEdge<Silence>) -> bool {
+    fn is_heard(edge: Edge<Silence>) -> bool {
         !edge.began
     }
 }

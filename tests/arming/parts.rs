@@ -65,7 +65,7 @@ impl<D: Devices> Bench<D> {
     /// Every change of a motor that was not read yet.
     fn edges(&mut self) -> Vec<(u8, Condition, bool)> {
         let edges = std::iter::from_fn(|| self.device.next_edge());
-        edges.map(|edge| (edge.motor.id(), edge.condition, edge.began)).collect()
+        edges.map(|edge| (edge.source.id(), edge.condition, edge.began)).collect()
     }
 
     fn drive(&mut self) {

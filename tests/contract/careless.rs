@@ -4,11 +4,11 @@ use super::dji::OneModel;
 use super::*;
 use drivetrain::dji::M3508;
 use drivetrain::motor::{
-    CanDevice, Capabilities, Capability, Claim, Edge, Ingest, MotorName, Role, Target, Visitor,
-    WrongSetting,
+    CanDevice, Capabilities, Capability, Claim, Condition, Ingest, MotorName, Role, Target,
+    Visitor, WrongSetting,
 };
 use drivetrain::sim::contract::{Rule, Violation};
-use drivetrain::time::{Duration, Instant, Tick};
+use drivetrain::time::{Duration, Edge, Instant, Tick};
 
 /// What a careless device gets wrong.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -111,7 +111,7 @@ impl CanDevice for Careless {
     fn second_master(&self) -> Option<Claim> {
         self.0.second_master()
     }
-    fn next_edge(&mut self) -> Option<Edge> {
+    fn next_edge(&mut self) -> Option<Edge<Condition, MotorName>> {
         CanDevice::next_edge(&mut self.0)
     }
     fn ask(&mut self) -> bool {
@@ -248,7 +248,7 @@ enum Slip {
 struct Slipping {
     wheels: OneModel<M3508, 2>,
     slip: Slip,
-    last: Option<Edge>,
+    last: Option<Edge<Condition, MotorName>>,
     repeated: u32,
     now: Instant,
 }
@@ -290,7 +290,7 @@ impl CanDevice for Slipping {
     fn second_master(&self) -> Option<Claim> {
         self.wheels.bus().second_master().filter(|_| self.slip != Slip::ArmsBesideAnother)
     }
-    fn next_edge(&mut self) -> Option<Edge> {
+    fn next_edge(&mut self) -> Option<Edge<Condition, MotorName>> {
         let edge = match self.slip {
             Slip::HasNoEdges => None,
             Slip::DropsEdges => self.last.take(),
@@ -307,9 +307,9 @@ impl CanDevice for Slipping {
         edge.map(|edge| Edge {
             at: if self.slip == Slip::StampsWhenRead { self.now } else { edge.at },
             began: edge.began ^ (self.slip == Slip::SwapsEdges),
-            motor: match self.slip {
-                Slip::NamesAnother => MotorName::new("M3508", 3 - edge.motor.id()),
-                _ => edge.motor,
+            source: match self.slip {
+                Slip::NamesAnother => MotorName::new("M3508", 3 - edge.source.id()),
+                _ => edge.source,
             },
             ..edge
         })

@@ -2,10 +2,11 @@
 
 use super::*;
 use drivetrain::motor::{
-    ArmError, CanDevice, Claim, Edge, Ingest, Malformed, MotorName, Role, Visitor, WrongSetting,
+    ArmError, CanDevice, Claim, Condition, Ingest, Malformed, MotorName, Role, Visitor,
+    WrongSetting,
 };
 use drivetrain::pwm::{Brushed, BrushedConfig, RcConfig, RcPwm};
-use drivetrain::time::{Duration, Instant, Tick};
+use drivetrain::time::{Duration, Edge, Instant, Tick};
 use embedded_hal::{digital, pwm};
 use std::cell::Cell;
 use std::convert::Infallible;
@@ -55,7 +56,7 @@ trait OnPins: VelocityDrive<()> {
     fn stop(&mut self);
     fn clear(&mut self);
     fn is_held(&self) -> bool;
-    fn edge(&mut self) -> Option<Edge>;
+    fn edge(&mut self) -> Option<Edge<Condition, MotorName>>;
 }
 
 impl OnPins for Brushed<Pin, [Pin; 1]> {
@@ -86,7 +87,7 @@ impl OnPins for Brushed<Pin, [Pin; 1]> {
     fn is_held(&self) -> bool {
         self.guard().is_stopped()
     }
-    fn edge(&mut self) -> Option<Edge> {
+    fn edge(&mut self) -> Option<Edge<Condition, MotorName>> {
         self.next_edge()
     }
 }
@@ -120,7 +121,7 @@ impl OnPins for RcPwm<Pin> {
     fn is_held(&self) -> bool {
         self.guard().is_stopped()
     }
-    fn edge(&mut self) -> Option<Edge> {
+    fn edge(&mut self) -> Option<Edge<Condition, MotorName>> {
         self.next_edge()
     }
 }
@@ -188,7 +189,7 @@ impl<M: OnPins> CanDevice for Wired<M> {
     fn second_master(&self) -> Option<Claim> {
         None
     }
-    fn next_edge(&mut self) -> Option<Edge> {
+    fn next_edge(&mut self) -> Option<Edge<Condition, MotorName>> {
         self.motor.edge()
     }
     /// The motor asks and starts in one.

@@ -154,7 +154,7 @@ fn f15_a_power_cycle_has_its_edges_in_order() {
     ];
     assert_eq!(told.len(), expected.len(), "{told:?}");
     for (edge, (condition, began, ms)) in told.iter().zip(expected) {
-        assert_eq!((edge.motor.id(), edge.condition, edge.began), (1, condition, began));
+        assert_eq!((edge.source.id(), edge.condition, edge.began), (1, condition, began));
         let off = edge.at.as_micros().abs_diff(ms * 1_000);
         assert!(off < 4_000, "{edge} and not at {ms} ms");
     }
@@ -472,7 +472,7 @@ fn f24_late_and_offline_are_edges_each_once() {
         rig.run(900, |_, _| {});
         let bus = rig.runner.device_mut();
         let told: Vec<_> = std::iter::from_fn(|| bus.next_edge()).collect();
-        assert!(told.iter().all(|edge| edge.motor.id() == 3), "the others: {told:?}");
+        assert!(told.iter().all(|edge| edge.source.id() == 3), "the others: {told:?}");
         let told: Vec<_> = told.iter().map(|edge| (edge.condition, edge.began)).collect();
         assert_eq!(told, expected);
     }

@@ -3,9 +3,9 @@ use drivetrain::control::PidConfig;
 use drivetrain::dji::{self, Gm6020Voltage, M3508};
 use drivetrain::frame::CanFrame;
 use drivetrain::geometry::{Heading, Twist, World, Vec2};
-use drivetrain::motor::{ArmError, Edge, VelocityDrive};
+use drivetrain::motor::{ArmError, Condition, MotorName, VelocityDrive};
 use drivetrain::runner::{EmergencyStop, Nb, Runner};
-use drivetrain::time::Clock;
+use drivetrain::time::{Clock, Edge};
 use drivetrain::units::{Angle, AngularVelocity};
 
 const SPEED: PidConfig = PidConfig::new(1.9, 2.4, 0.0); // A per rad/s, A per rad: 20 kg, see docs/gains.md
@@ -21,7 +21,7 @@ trait Pilot {
     fn heading(&self) -> Heading; // from the IMU
     fn offer(&mut self, frame: &CanFrame); // a frame that is no motor's
     fn report(&mut self, why: ArmError); // "no feedback from M3508 #3"
-    fn note(&mut self, change: Edge); // "M3508 #2: ESC fault began at 10240 us"
+    fn note(&mut self, change: Edge<Condition, MotorName>); // "M3508 #2: ESC fault began at 10240 us"
 }
 
 fn robot(

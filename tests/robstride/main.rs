@@ -13,12 +13,12 @@ use drivetrain::control::PidConfig;
 use drivetrain::error::ConfigError;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    AngleDrive, ArmError, Devices, Edge, Impedance, ImpedanceControl, Own, TargetError,
-    VelocityDrive,
+    AngleDrive, ArmError, Condition, Devices, Impedance, ImpedanceControl, MotorName, Own,
+    TargetError, VelocityDrive,
 };
 use drivetrain::robstride::{Mode, Model, Motor, Register, Status};
 use drivetrain::sim::{DriveShaft, RobStrideDrive};
-use drivetrain::time::{Duration, Instant, Tick};
+use drivetrain::time::{Duration, Edge, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 
 /// The type of a frame.
@@ -318,7 +318,8 @@ fn a_fault_trips_and_is_an_edge_with_its_code_and_is_cleared() {
             assert_eq!(bench.own.motor().reported_faults(), faults);
         }
         bench.steps(2, drive);
-        let edges: Vec<Edge> = std::iter::from_fn(|| bench.own.next_edge()).collect();
+        let edges: Vec<Edge<Condition, MotorName>> =
+            std::iter::from_fn(|| bench.own.next_edge()).collect();
         assert!(!edges.is_empty());
         assert_eq!(bench.own.health().error_code, code, "{edges:?}");
         bench.steps(300, drive);

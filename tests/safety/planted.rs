@@ -24,7 +24,8 @@
 //! | second master | it relaxes no motor that is configured so (`Watch::check`) | dji and own | 120 |
 
 use super::*;
-use drivetrain::motor::{Claim, Conditions, Edge, TargetError};
+use drivetrain::motor::{Claim, Condition, Conditions, MotorName, TargetError};
+use drivetrain::time::Edge;
 use reference::Rules;
 
 /// Defect of a wheel.
@@ -50,7 +51,7 @@ struct Planted {
     wheel: Wheel<false>,
     defect: Defect,
     target: f32,
-    edge: Option<(usize, Edge)>,
+    edge: Option<(usize, Edge<Condition, MotorName>)>,
     master: std::cell::Cell<Option<Claim>>,
 }
 
@@ -102,7 +103,7 @@ impl Subject<1> for Planted {
     fn conditions(&self) -> [Conditions; 1] {
         self.wheel.conditions()
     }
-    fn next_edge(&mut self) -> Option<(usize, Edge)> {
+    fn next_edge(&mut self) -> Option<(usize, Edge<Condition, MotorName>)> {
         let edge = self.wheel.next_edge();
         match self.defect {
             Defect::Loses => edge.and_then(|_| self.wheel.next_edge()),

@@ -6,8 +6,8 @@ use crate::wiring::{Drive, START, Targets, row_tick};
 use drivetrain::dji::{Bus, Handle, M3508, State};
 use drivetrain::encoder::Position;
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{Edge, TargetError};
-use drivetrain::time::Tick;
+use drivetrain::motor::{Condition, MotorName, TargetError};
+use drivetrain::time::{Edge, Tick};
 use drivetrain::units::{Angle, AngularVelocity, Current};
 
 type Wheel = Handle<M3508>;
@@ -56,7 +56,7 @@ fn call_set_raw(bus: &mut Bus, wheel: Wheel, word: i16) -> Result<(), TargetErro
 
 #[unsafe(no_mangle)]
 #[inline(never)]
-fn call_next_edge(bus: &mut Bus) -> Option<Edge> {
+fn call_next_edge(bus: &mut Bus) -> Option<Edge<Condition, MotorName>> {
     bus.next_edge()
 }
 

@@ -43,7 +43,7 @@ fn a_device_names_who_is_faulty_and_who_else_commands_and_tells_edges() {
         }
         assert_eq!(id_of(device.faulty()), Some(2));
         let edge = Devices::next_edge(device).unwrap();
-        assert_eq!((edge.motor.id(), edge.condition, edge.began), (2, Condition::Fault, true));
+        assert_eq!((edge.source.id(), edge.condition, edge.began), (2, Condition::Fault, true));
         let command = CanFrame::standard(0x200, [1; 8]).unwrap();
         assert_eq!(Devices::ingest(device, &command, at_ms(20)), Ingest::Unrelated);
         assert!(device.second_master().is_some());

@@ -1,13 +1,14 @@
 //! Conditions of the motors of a bus: begin, end, and consequences.
 
 use super::*;
-use crate::motor::{Condition, Conditions, Edge};
+use crate::motor::{Condition, Conditions, MotorName};
+use crate::time::Edge;
 
 fn hear(bus: &mut Bus, id: u16, ms: u64) {
     assert_eq!(bus.ingest(&feedback(id, 0, 0), at_ms(ms)), Ingest::Taken);
 }
 
-fn edges(bus: &mut Bus) -> Vec<Edge> {
+fn edges(bus: &mut Bus) -> Vec<Edge<Condition, MotorName>> {
     core::iter::from_fn(|| bus.next_edge()).collect()
 }
 
@@ -57,7 +58,7 @@ fn a_second_master_is_forgotten_a_second_after_its_last_frame_and_not_earlier() 
                 assert_eq!(bus.conditions(wheel), Conditions::NONE.with(Condition::SecondMaster));
             }
             let changed = edges(&mut bus).into_iter();
-            ended.extend(changed.filter(|edge| !edge.began).map(|edge| (edge.motor.id(), ms)));
+            ended.extend(changed.filter(|edge| !edge.began).map(|edge| (edge.source.id(), ms)));
         }
         ended.sort_unstable();
         assert_eq!(ended.iter().map(|(id, _)| *id).collect::<Vec<_>>(), [1, 2, 3]);

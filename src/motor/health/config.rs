@@ -8,7 +8,7 @@ use crate::units::Angle;
 pub enum Reaction {
     /// Nothing: the condition is not checked.
     Ignore,
-    /// An [`Edge`](super::Edge).
+    /// An [`Edge`](crate::time::Edge).
     Report,
     /// An edge, and zero output with the loops reset until the motor is armed again.
     Relax,

@@ -1,41 +1,11 @@
 use super::{Condition, Conditions, HealthConfig};
 use crate::motor::{MotorName, Severity};
-use crate::time::Instant;
+use crate::time::{Edge, Instant};
 
-/// One change of a condition of one motor.
-///
-/// An edge is latched until read, and read once, so no edge is lost. While an edge waits, the same change is not noted again: an error that
-/// comes and goes at 1 kHz is one edge.
-///
-/// # Examples
-/// ```
-/// use drivetrain::motor::{Condition, Edge, MotorName};
-/// use drivetrain::time::Instant;
-///
-/// let motor = MotorName::new("M3508", 2);
-/// let edge = Edge { motor, condition: Condition::Late, began: true, at: Instant::from_micros(11_264) };
-/// assert_eq!(edge.to_string(), "M3508 #2: late began at 11264 us");
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct Edge {
-    /// The motor.
-    pub motor: MotorName,
-    /// The changed condition.
-    pub condition: Condition,
-    /// Whether the condition began; otherwise the condition ended.
-    pub began: bool,
-    /// Time of detection, rounded down to 1.024 ms, up to an age of 24 days. If more edges wait than the owner of the motor has times for
-    /// (12 for a [`Bus`](crate::dji::Bus), 6 for a motor outside of a bus and for a joint), the later edges have the last time kept: they
-    /// came later.
-    pub at: Instant,
-}
-
-impl core::fmt::Display for Edge {
+impl<C: core::fmt::Display> core::fmt::Display for Edge<C, MotorName> {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let phase = if self.began { "began" } else { "ended" };
-        write!(f, "{}: {} {phase} at {} us", self.motor, self.condition, self.at.as_micros())
+        let Self { source, condition, began, at } = self;
+        write!(f, "{source}: {}", Edge { source: (), condition, began: *began, at: *at })
     }
 }
 

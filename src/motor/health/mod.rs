@@ -5,9 +5,9 @@
 //!                                       └─ each change, latched ──> Edge ──> next_edge()
 //! ```
 //!
-//! A [`Condition`] holds or does not. Each change of a condition is an [`Edge`], latched until read. Conditions that decide about safety in
-//! the next tick (ages of feedback and of targets) are checked in every tick. The others are checked for one motor a tick, so the cost does
-//! not depend on the number of motors. Times until detection, on a [`Bus`](crate::dji::Bus) at 1 kHz:
+//! A [`Condition`] holds or does not. Each change of a condition is an [`Edge`](crate::time::Edge), latched until read. Conditions that
+//! decide about safety in the next tick (ages of feedback and of targets) are checked in every tick. The others are checked for one motor a
+//! tick, so the cost does not depend on the number of motors. Times until detection, on a [`Bus`](crate::dji::Bus) at 1 kHz:
 //!
 //! | condition | checked | undetected |
 //! |---|---|---|
@@ -30,7 +30,6 @@ use super::{Link, MotorName};
 use crate::time::Duration;
 
 pub use config::{HealthConfig, Reaction};
-pub use edge::Edge;
 pub(crate) use edge::{Journal, Latch};
 pub(crate) use monitor::{Monitor, Sample, elapsed};
 pub(crate) use traffic::{Rival, Traffic};

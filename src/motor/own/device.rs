@@ -3,8 +3,8 @@
 use super::{INQUIRY, Impedance, Offered, Order, Own, OwnMotor, Target};
 use crate::frame::CanFrame;
 use crate::math::wrap_pi;
-use crate::motor::{CanDevice, Claim, Edge, Ingest, Link, MotorName, Role, WrongSetting};
-use crate::time::{Instant, Tick, TimeStep};
+use crate::motor::{CanDevice, Claim, Condition, Ingest, Link, MotorName, Role, WrongSetting};
+use crate::time::{Edge, Instant, Tick, TimeStep};
 use crate::units::Angle;
 use embedded_can::Frame;
 
@@ -109,7 +109,7 @@ impl<M: OwnMotor> CanDevice for Own<M> {
         self.rival.filter(|_| self.watch.has_rival())
     }
 
-    fn next_edge(&mut self) -> Option<Edge> {
+    fn next_edge(&mut self) -> Option<Edge<Condition, MotorName>> {
         self.guard.next_edge(self.motor.name())
     }
 

@@ -2,11 +2,10 @@ use super::Brushed;
 use crate::control::{Pid, PidConfig};
 use crate::error::ConfigError;
 use crate::motor::{
-    Condition, Conditions, Edge, Health, HealthConfig, MotorName, OPENING, Reaction, Timeouts,
-    Vitals,
+    Condition, Conditions, Health, HealthConfig, MotorName, OPENING, Reaction, Timeouts, Vitals,
 };
 use crate::pwm::Direction;
-use crate::time::{Duration, Instant};
+use crate::time::{Duration, Edge, Instant};
 use crate::units::AngularVelocity;
 use core::f32::consts::TAU;
 use embedded_hal::pwm::SetDutyCycle;
@@ -178,7 +177,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
 
     /// Returns the oldest unread edge. No edge is lost, however late the reading; while an edge waits, the same change
     /// is not noted again.
-    pub fn next_edge(&mut self) -> Option<Edge> {
+    pub fn next_edge(&mut self) -> Option<Edge<Condition, MotorName>> {
         self.guard.next_edge(self.config.name)
     }
 

@@ -252,7 +252,7 @@ fn run(
         _ = motor.set_velocity((), AngularVelocity::from_rad_per_s(goal));
         motor.update(tick(ms)).unwrap();
         while let Some(edge) = motor.next_edge() {
-            assert_eq!(edge.motor.to_string(), "brushed #3");
+            assert_eq!(edge.source.to_string(), "brushed #3");
             assert!(at_ms(ms).since(edge.at).as_micros() < 1_024, "{edge} seen after {ms} ms");
             seen.push((edge.condition, edge.began, ms));
         }

@@ -159,7 +159,7 @@ fn a_lost_command_is_one_edge_with_its_time_however_often_it_happens() {
         }
     }
     let edge = esc.next_edge().unwrap();
-    assert_eq!(edge.motor.to_string(), "RC PWM #7");
+    assert_eq!(edge.source.to_string(), "RC PWM #7");
     assert_eq!((edge.condition, edge.began), (Condition::CommandLost, true));
     assert!((118_976..=120_000).contains(&edge.at.as_micros()), "{edge}");
     assert!(esc.next_edge().is_some_and(|edge| !edge.began) && esc.next_edge().is_none());

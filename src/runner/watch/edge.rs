@@ -3,7 +3,7 @@
 
 use super::{BUS_LOST_AFTER, Watch};
 use crate::motor::take_age;
-use crate::time::{ConditionEdge, Duration, Instant};
+use crate::time::{Duration, Edge, Instant};
 
 /// A fault of the bus as a whole, for a moment or for hours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -57,7 +57,7 @@ impl core::fmt::Display for BusCondition {
 }
 
 /// Beginning or end of a [`BusCondition`], for [`Runner::next_edge`](crate::runner::Runner::next_edge).
-pub(super) type BusEdge = ConditionEdge<BusCondition>;
+pub(super) type BusEdge = Edge<BusCondition>;
 
 /// Time without an incident after which a repeated condition ends.
 const CALM: Duration = Duration::from_secs(1);
@@ -171,9 +171,9 @@ impl Latch {
     const fn waiting(&self, condition: BusCondition) -> Option<BusEdge> {
         // While the condition is present, a pending end belongs to the time before.
         if self.end_waits && (self.active || !self.begin_waits) {
-            Some(ConditionEdge { condition, began: false, at: self.ended })
+            Some(Edge { source: (), condition, began: false, at: self.ended })
         } else if self.begin_waits {
-            Some(ConditionEdge { condition, began: true, at: self.began })
+            Some(Edge { source: (), condition, began: true, at: self.began })
         } else {
             None
         }

@@ -1,10 +1,8 @@
 //! Rules about the edges of the motors of a device.
 
 use super::{Outcome, Rule, Run, Subject};
-use crate::motor::{
-    ArmError, Claim, Condition, Conditions, Devices, Edge, Ingest, MotorName, Role,
-};
-use crate::time::{Duration, Instant};
+use crate::motor::{ArmError, Claim, Condition, Conditions, Devices, Ingest, MotorName, Role};
+use crate::time::{Duration, Edge, Instant};
 use embedded_can::Frame;
 
 /// Of so many motors the edges are told apart.
@@ -23,7 +21,7 @@ impl Told {
     fn read<S: Subject>(run: &mut Run<S>, rule: Rule) -> Result<Self, super::Violation> {
         let mut told = Self::NONE;
         while let Some(edge) = run.subject.device().next_edge() {
-            let motor = index(run, edge.motor);
+            let motor = index(run, edge.source);
             run.expect(motor.is_some(), rule)?;
             if let Some((began, ended)) = motor.and_then(|motor| told.0.get_mut(motor)) {
                 let place = if edge.began { began } else { ended };
@@ -73,7 +71,9 @@ pub(super) fn per_change<S: Subject>(make: &impl Fn() -> S) -> Outcome {
             run.expect(edge.is_none(), rule)?;
         }
         let name = called(&mut run, silent);
-        let late = |edge: &Edge, began| edge.condition == Condition::Late && edge.began == began;
+        let late = |edge: &Edge<Condition, MotorName>, began| {
+            edge.condition == Condition::Late && edge.began == began
+        };
         for (began, ms) in [(true, run.subject.late_ms() + 2), (false, 20)] {
             let mut changes = 0;
             for _ in 0..ms {
@@ -81,7 +81,7 @@ pub(super) fn per_change<S: Subject>(make: &impl Fn() -> S) -> Outcome {
                 run.step_without(if began { silent } else { usize::MAX })?;
                 while let Some(edge) = run.subject.device().next_edge() {
                     let timely = edge.at + UNIT > run.now() && edge.at <= run.now();
-                    let named = Some(edge.motor) == name || edge.condition != Condition::Late;
+                    let named = Some(edge.source) == name || edge.condition != Condition::Late;
                     changes += u32::from(late(&edge, began));
                     run.expect(timely && named && changes <= 1, rule)?;
                 }
@@ -116,7 +116,8 @@ pub(super) fn wait<S: Subject>(mut run: Run<S>) -> Outcome {
     for motor in 0..motors.min(MOST_MOTORS) {
         let name = called(&mut run, motor);
         let begins = Some((name, Condition::Late, true));
-        let read_first = first.map(|edge| (Some(edge.motor), edge.condition, edge.began)) == begins;
+        let read_first =
+            first.map(|edge| (Some(edge.source), edge.condition, edge.began)) == begins;
         let has = |condition, began| told.has(motor, condition, began);
         let both = (has(Condition::Late, true) || read_first) && has(Condition::Late, false);
         run.expect(both, rule)?;
@@ -149,7 +150,9 @@ pub(super) fn flood<S: Subject>(mut run: Run<S>) -> Outcome {
 /// An expired target is an edge, and a new target too.
 pub(super) fn lost_command<S: Subject>(mut run: Run<S>) -> Outcome {
     let rule = Rule::ChangeIsAnEdge;
-    let lost = |edge: &Edge, began| edge.condition == Condition::CommandLost && edge.began == began;
+    let lost = |edge: &Edge<Condition, MotorName>, began| {
+        edge.condition == Condition::CommandLost && edge.began == began
+    };
     let (mut begun, mut ended) = (0, 0);
     for _ in 0..run.subject.command_ms() + 50 {
         run.step()?;

@@ -1,9 +1,9 @@
 //! Conditions of one joint.
 
 use super::{LAST, Slot};
-use crate::motor::{Condition, Edge, Health, Link, Reaction};
+use crate::motor::{Condition, Health, Link, MotorName, Reaction};
 use crate::snake::PULSES_PER_TURN;
-use crate::time::{Duration, Instant};
+use crate::time::{Duration, Edge, Instant};
 
 /// A joint that moves less than this stands.
 const STANDS: u32 = PULSES_PER_TURN.unsigned_abs() / 256;
@@ -85,7 +85,7 @@ pub(in crate::snake) fn next_edge_at(slot: &Slot) -> Option<Instant> {
     slot.id.and_then(|_| slot.guard.next_edge_at())
 }
 
-pub(in crate::snake) fn next_edge(slot: &mut Slot) -> Option<Edge> {
+pub(in crate::snake) fn next_edge(slot: &mut Slot) -> Option<Edge<Condition, MotorName>> {
     let motor = slot.name()?;
     slot.guard.next_edge(motor)
 }

@@ -1,14 +1,15 @@
 //! Every change is an edge with its time, waits until it is read, and is read once.
 
 use super::*;
-use crate::motor::{Condition, Edge, Reaction};
+use crate::motor::{Condition, MotorName, Reaction};
+use crate::time::Edge;
 
 /// Reads all that waits: joint, condition, whether it began.
 fn edges(joints: &mut Joints) -> Vec<(u8, Condition, bool)> {
-    read(joints).into_iter().map(|edge| (edge.motor.id(), edge.condition, edge.began)).collect()
+    read(joints).into_iter().map(|edge| (edge.source.id(), edge.condition, edge.began)).collect()
 }
 
-fn read(joints: &mut Joints) -> Vec<Edge> {
+fn read(joints: &mut Joints) -> Vec<Edge<Condition, MotorName>> {
     core::iter::from_fn(|| joints.next_edge()).collect()
 }
 
@@ -32,7 +33,7 @@ fn a_silent_joint_is_late_and_lost_and_both_end_when_it_is_back() {
         for edge in read(&mut bench.joints) {
             let age = at_ms(bench.ms).since(edge.at).as_micros();
             assert!(age < 1_024, "the time is that of the tick in which it was noticed: {age}");
-            seen.push((edge.motor.id(), edge.condition, edge.began, bench.ms - silent));
+            seen.push((edge.source.id(), edge.condition, edge.began, bench.ms - silent));
         }
     }
     let [(5, Condition::Late, true, late), (5, Condition::Offline, true, lost), rest] = seen[..]
@@ -79,7 +80,8 @@ fn edges_of_several_joints_are_read_in_the_order_in_which_they_came() {
         bench.drive(40);
     }
     let all = read(&mut bench.joints);
-    let began: Vec<u8> = all.iter().filter(|edge| edge.began).map(|edge| edge.motor.id()).collect();
+    let began: Vec<u8> =
+        all.iter().filter(|edge| edge.began).map(|edge| edge.source.id()).collect();
     assert_eq!(began, [9, 2, 12, 5]);
     assert!(all.windows(2).all(|pair| pair[0].at <= pair[1].at), "{all:?}");
     assert_eq!(all.len(), 8, "each of them ended");

@@ -1,5 +1,5 @@
 use super::{BarrelHeat, MAX_FRAME, RefereeMessage};
-use crate::time::{ConditionEdge, Duration, Instant};
+use crate::time::{Duration, Edge, Instant};
 use crate::wire::receiver::Deadline;
 use crate::wire::{Counts, Deframer, Silence};
 
@@ -176,7 +176,7 @@ impl Referee {
 
     /// Returns the oldest unread edge of the power limit's silence.
     #[must_use]
-    pub fn edge(&mut self, now: Instant) -> Option<ConditionEdge<Silence>> {
+    pub fn edge(&mut self, now: Instant) -> Option<Edge<Silence>> {
         self.limit_w.deadline.edge(now)
     }
 

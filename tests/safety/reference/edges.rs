@@ -1,7 +1,8 @@
 //! The conditions of one motor, and a list of their changes that nobody has read.
 
 use super::{BadStep, Reference};
-use drivetrain::motor::{Condition, Conditions, Edge};
+use drivetrain::motor::{Condition, Conditions, MotorName};
+use drivetrain::time::Edge;
 
 const KNOWN: [Condition; 5] = [
     Condition::Late,
@@ -24,12 +25,12 @@ struct Change {
 }
 
 impl Change {
-    fn is(&self, edge: &Edge) -> bool {
+    fn is(&self, edge: &Edge<Condition, MotorName>) -> bool {
         (self.condition, self.began) == (edge.condition, edge.began)
     }
 
     /// Times are told in units of 1024 µs, rounded down.
-    fn has_time_of(&self, edge: &Edge) -> bool {
+    fn has_time_of(&self, edge: &Edge<Condition, MotorName>) -> bool {
         self.at / 1024 == edge.at.as_micros() / 1024
     }
 }
@@ -104,7 +105,7 @@ impl Edges {
     }
 
     /// Takes an edge that the device has returned; its last update was at `updated`.
-    pub(super) fn read(&mut self, edge: &Edge, updated: u64) {
+    pub(super) fn read(&mut self, edge: &Edge<Condition, MotorName>, updated: u64) {
         let is_told = |change: &Change| change.at.abs_diff(updated) < TOLD_US;
         if let Some(oldest) = self.unread.first().map(|change| change.call) {
             let mut first = self.unread.iter().take_while(|change| change.call == oldest);
@@ -137,7 +138,7 @@ impl Reference {
     }
 
     /// Tells whether an edge of another condition may be: a motor of a bus that lost frames is not sure of its turns, once.
-    pub(crate) fn is_news(&mut self, edge: &Edge) -> bool {
+    pub(crate) fn is_news(&mut self, edge: &Edge<Condition, MotorName>) -> bool {
         let is_doubt = edge.condition == Condition::PositionUncertain && edge.began;
         let is_bus = self.rules.bad_step == BadStep::Repeats;
         is_doubt && is_bus && !core::mem::replace(&mut self.is_in_doubt, true)
@@ -147,7 +148,7 @@ impl Reference {
         !self.edges.is_read()
     }
 
-    pub(crate) fn read(&mut self, edge: &Edge) {
+    pub(crate) fn read(&mut self, edge: &Edge<Condition, MotorName>) {
         self.edges.read(edge, self.updated);
     }
 

@@ -54,7 +54,7 @@ impl<const RESUMES: bool> Subject<1> for Wheel<RESUMES> {
     fn conditions(&self) -> [Conditions; 1] {
         [self.0.conditions(self.1)]
     }
-    fn next_edge(&mut self) -> Option<(usize, Edge)> {
+    fn next_edge(&mut self) -> Option<(usize, Edge<Condition, MotorName>)> {
         self.0.next_edge().map(|edge| (0, edge))
     }
     fn command(&self, _: usize) -> Option<CanFrame> {
@@ -123,9 +123,9 @@ impl Subject<2> for Both {
         let [wheel] = self.0.conditions();
         [wheel, self.1.guard().conditions()]
     }
-    fn next_edge(&mut self) -> Option<(usize, Edge)> {
+    fn next_edge(&mut self) -> Option<(usize, Edge<Condition, MotorName>)> {
         let edge = (&mut self.0.0, &mut self.1).next_edge()?;
-        Some((usize::from(edge.motor.model() != "M3508"), edge))
+        Some((usize::from(edge.source.model() != "M3508"), edge))
     }
     fn command(&self, motor: usize) -> Option<CanFrame> {
         let own = embedded_can::StandardId::new(0x123).unwrap();

@@ -70,7 +70,7 @@ impl<const LISTENS: bool> Subject<1> for Bare<LISTENS> {
     fn conditions(&self) -> [Conditions; 1] {
         [self.0.conditions()]
     }
-    fn next_edge(&mut self) -> Option<(usize, Edge)> {
+    fn next_edge(&mut self) -> Option<(usize, Edge<Condition, MotorName>)> {
         self.0.next_edge(MotorName::new("bare", 1)).map(|edge| (0, edge))
     }
 }

@@ -62,7 +62,7 @@ impl Subject<1> for Snake {
     fn conditions(&self) -> [Conditions; 1] {
         [self.0.conditions(self.1)]
     }
-    fn next_edge(&mut self) -> Option<(usize, Edge)> {
+    fn next_edge(&mut self) -> Option<(usize, Edge<Condition, MotorName>)> {
         self.0.next_edge().map(|edge| (0, edge))
     }
     fn command(&self, _: usize) -> Option<CanFrame> {

@@ -14,9 +14,9 @@ pub(super) use bus::{Both, Wheel};
 pub(super) use drives::{Damiao, RobStride, Vesc};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    ArmError, Claim, Condition, Conditions, Edge, HealthConfig, Link, Reaction, TargetError,
+    ArmError, Claim, Condition, Conditions, HealthConfig, Link, MotorName, Reaction, TargetError,
 };
-use drivetrain::time::{Instant, Tick};
+use drivetrain::time::{Edge, Instant, Tick};
 pub(super) use guard::Bare;
 pub(super) use joints::Snake;
 pub(super) use lk::{Lk, Rmd};
@@ -45,7 +45,7 @@ pub(super) trait Subject<const N: usize> {
     }
     fn conditions(&self) -> [Conditions; N];
     /// Returns an unread edge, with the place of its motor.
-    fn next_edge(&mut self) -> Option<(usize, Edge)>;
+    fn next_edge(&mut self) -> Option<(usize, Edge<Condition, MotorName>)>;
 
     /// Returns a command of a motor as another controller sends it.
     fn command(&self, motor: usize) -> Option<CanFrame> {
@@ -149,7 +149,7 @@ macro_rules! own {
         fn conditions(&$self) -> [Conditions; 1] {
             [$motor.guard().conditions()]
         }
-        fn next_edge(&mut $self) -> Option<(usize, Edge)> {
+        fn next_edge(&mut $self) -> Option<(usize, Edge<Condition, MotorName>)> {
             Devices::next_edge(&mut $motor).map(|edge| (0, edge))
         }
         fn second_master(&$self) -> [Option<Claim>; 1] {

@@ -46,7 +46,7 @@ macro_rules! calls {
         fn conditions(&self) -> [Conditions; 1] {
             [Self::conditions(self)]
         }
-        fn next_edge(&mut self) -> Option<(usize, Edge)> {
+        fn next_edge(&mut self) -> Option<(usize, Edge<Condition, MotorName>)> {
             Self::next_edge(self).map(|edge| (0, edge))
         }
         fn disarm(&mut self) {

@@ -339,7 +339,7 @@ impl Session {
     fn take_edges(&mut self, now: Instant) -> Vec<String> {
         let mut changes = Vec::new();
         while let Some(edge) = self.runner.device_mut().next_edge() {
-            let motor = self.robot().names().position(|name| name == edge.motor);
+            let motor = self.robot().names().position(|name| name == edge.source);
             if is_silence(edge.condition) && motor.is_some_and(|motor| self.is_unasked(motor)) {
                 continue;
             }

@@ -8,10 +8,10 @@ use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
 use drivetrain::error::ConfigError;
 use drivetrain::geometry::{Body, Twist, Vec2};
-use drivetrain::motor::{ArmError, Edge, Link};
+use drivetrain::motor::{ArmError, Condition, Link, MotorName};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{ChassisConfig, MotorConfig, MotorKey, Simulation, Wheel};
-use drivetrain::time::{Duration, Instant, Tick};
+use drivetrain::time::{Duration, Edge, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use std::error::Error;
 
@@ -102,7 +102,7 @@ pub(crate) trait Robot {
     fn set_gains(&mut self, speed: PidConfig) -> Result<(), ConfigError>;
     fn wheels(&self) -> Vec<WheelView>;
     /// An edge of a motor: a fault that begins or ends.
-    fn next_edge(&mut self) -> Option<Edge>;
+    fn next_edge(&mut self) -> Option<Edge<Condition, MotorName>>;
     /// An edge of the bus itself, with its time.
     fn next_bus_edge(&mut self) -> Option<(Instant, String)>;
 }
@@ -280,7 +280,7 @@ impl<K: Kinematics<Speed = AngularVelocity>> Robot for OnWheels<K> {
         views
     }
 
-    fn next_edge(&mut self) -> Option<Edge> {
+    fn next_edge(&mut self) -> Option<Edge<Condition, MotorName>> {
         self.runner.device_mut().next_edge()
     }
 

@@ -207,7 +207,7 @@ impl Session {
             while let Some(edge) = self.robot.next_edge() {
                 self.note_at(
                     edge.at,
-                    format_args!("{}: {} {}", edge.motor, edge.condition, phase(edge.began)),
+                    format_args!("{}: {} {}", edge.source, edge.condition, phase(edge.began)),
                 );
             }
             while let Some((at, text)) = self.robot.next_bus_edge() {

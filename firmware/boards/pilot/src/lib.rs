@@ -22,7 +22,7 @@ use drivetrain::chassis::{Chassis, ChassisLimits, Mecanum, MecanumWheels};
 use drivetrain::control::{PidConfig, WheelTuning};
 use drivetrain::dji::{Bus, Config, Handle, M3508, Model};
 use drivetrain::geometry::{Heading, Twist, Vec2};
-use drivetrain::time::{ConditionEdge, Duration, Instant, Tick};
+use drivetrain::time::{Duration, Edge, Instant, Tick};
 use drivetrain::units::{AngularVelocity, Current};
 use drivetrain::wire::dbus::{Dbus, Remote};
 use drivetrain::wire::hipnuc::{Imu, MAX_FRAME};
@@ -148,11 +148,7 @@ impl Pilot {
     }
 
     /// Hands over who was heard and lost since, for the log.
-    pub fn edges(
-        &mut self,
-        now: Instant,
-        mut log: impl FnMut(&'static str, ConditionEdge<Silence>),
-    ) {
+    pub fn edges(&mut self, now: Instant, mut log: impl FnMut(&'static str, Edge<Silence>)) {
         while let Some(edge) = self.dbus.edge(now) {
             log("remote control", edge);
         }
