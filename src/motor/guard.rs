@@ -95,6 +95,12 @@ impl Guard {
         is_heard.then(|| age(now.stamp(), self.motor.heard()))
     }
 
+    /// Tells whether a silence ends now in which a drive may have started again: of 100 ms, or more where feedback is late only after more.
+    pub(super) fn ends_silence(&self, now: Instant) -> bool {
+        let silence_us = self.device.timeouts().late_us().max(100_000);
+        self.gap_us(now).is_some_and(|gap| gap >= silence_us)
+    }
+
     fn forget_bygones(&mut self, before: Instant, now: Instant) {
         let is_pause = self.device.is_pause(before);
         self.change(now, |motor| motor.forget_bygones(now.stamp(), is_pause));

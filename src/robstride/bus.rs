@@ -342,7 +342,8 @@ impl OwnMotor for Motor {
 
     fn capabilities(&self) -> Capabilities {
         let known = self.mode.control.capabilities().with(Capability::Temperature);
-        known.with(Capability::ErrorCodes).with(Capability::AbsoluteAngle)
+        let known = known.with(Capability::ErrorCodes);
+        if self.model.knows_angle() { known.with(Capability::AbsoluteAngle) } else { known }
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "16 bits in tenths")]

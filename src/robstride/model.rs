@@ -134,6 +134,11 @@ impl Model {
         !self.is_cybergear
     }
 
+    /// Tells whether the drive knows its angle within a turn from power-on. A CyberGear counts from where its shaft was then.
+    pub(super) const fn knows_angle(&self) -> bool {
+        !self.is_cybergear
+    }
+
     /// Returns the run mode for positions without a profile: 5 (CSP), for a CyberGear 1.
     pub(super) const fn position_mode(&self) -> u8 {
         if self.is_cybergear { 1 } else { 5 }

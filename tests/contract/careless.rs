@@ -401,12 +401,13 @@ fn the_check_finds_what_a_struct_of_devices_does_not_forward() {
 enum Haste {
     None,
     IgnoresTheShare,
-    OpensByItsIntegral,
+    BeginsAbove,
+    OpensTooEarly,
     HasNoLimit,
 }
 
 /// A motor whose command is its torque in percent of the largest, 2 Nm.
-struct Hasty(Haste, f32);
+struct Hasty(Haste);
 
 impl OwnMotor for Hasty {
     fn name(&self) -> MotorName {
@@ -427,11 +428,11 @@ impl OwnMotor for Hasty {
     }
     fn control(&mut self, Order { target, share, .. }: Order) -> CanFrame {
         let Target::Torque(torque_nm) = target else { return self.rest() };
-        self.1 += 0.001;
         let limit = match self.0 {
             Haste::None => share,
             Haste::IgnoresTheShare => 1.0,
-            Haste::OpensByItsIntegral => (0.7 + self.1).min(1.0),
+            Haste::BeginsAbove => (0.3 + 0.7 * share).min(1.0),
+            Haste::OpensTooEarly => (3.0 * share).min(1.0),
             Haste::HasNoLimit => 10.0 * share,
         };
         let effort = (torque_nm / 2.0).clamp(-limit, limit);
@@ -439,9 +440,7 @@ impl OwnMotor for Hasty {
         let percent = (100.0 * effort) as i8;
         CanFrame::new(id(0x123), &percent.to_be_bytes()).unwrap()
     }
-    fn reset(&mut self) {
-        self.1 = 0.0;
-    }
+    fn reset(&mut self) {}
     fn capabilities(&self) -> Capabilities {
         Capabilities::of(&[Capability::Torque, Capability::Feedback])
     }
@@ -473,10 +472,11 @@ fn the_check_finds_a_loop_that_drives_at_once_or_without_a_limit() {
     for (haste, knows_effort, found) in [
         (Haste::None, true, Ok(RULES)),
         (Haste::IgnoresTheShare, false, Err(Rule::OpensFromZero)),
-        (Haste::OpensByItsIntegral, true, Err(Rule::OpensFromZero)),
+        (Haste::BeginsAbove, true, Err(Rule::OpensFromZero)),
+        (Haste::OpensTooEarly, true, Err(Rule::OpensFromZero)),
         (Haste::HasNoLimit, true, Err(Rule::OpensFromZero)),
     ] {
-        let checked = check_contract(|| HastySubject(Own::new(Hasty(haste, 0.0)), knows_effort));
+        let checked = check_contract(|| HastySubject(Own::new(Hasty(haste)), knows_effort));
         assert_eq!(checked.map_err(|violation| violation.rule), found, "{haste:?}");
     }
 }

@@ -70,6 +70,14 @@ impl Subject for Joint {
         let is_enabling = command.bytes() == &[0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFC];
         !is_enabling && (!drive.is_enabled() || turned.shaft().torque_nm().abs() <= 10.0 / 4095.0)
     }
+    /// The torque of the drive at rest at zero, of the limit of 3 Nm that the motors in MIT mode have.
+    fn effort(&self, command: &CanFrame) -> Option<f32> {
+        let mut turned = *self.drive.borrow();
+        let is_mit = command.header() == 1;
+        turned.hear(command);
+        turned.step(1e-6);
+        is_mit.then(|| turned.shaft().torque_nm() / 3.0)
+    }
     /// What others send about registers may be for another drive.
     fn rival(&self, command: &Claim) -> Option<CanFrame> {
         (command.id() != embedded_can::Id::from(id(0x7FF)))

@@ -3,8 +3,8 @@
 use crate::drives::{raw, with_id};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    AngleDrive, ArmError, BusLoad, CanDevice, Capability, Claim, Devices, Ingest, Link, Own,
-    OwnMotor, TargetError, VelocityDrive,
+    AngleDrive, ArmError, BusLoad, CanDevice, Claim, Devices, Ingest, Link, Own, OwnMotor,
+    TargetError, VelocityDrive,
 };
 use drivetrain::sim::DriveShaft;
 use drivetrain::time::{Instant, Tick};
@@ -28,7 +28,6 @@ pub(crate) trait Device {
     fn set_present_angle(&mut self, angle_rad: f32) -> Result<(), TargetError>;
     fn angle_rad(&self) -> Option<f32>;
     fn velocity_rad_per_s(&self) -> Option<f32>;
-    fn knows_angle_from_power_on(&self) -> bool;
     fn link(&self) -> Link;
     fn claims(&self) -> Vec<Claim>;
     fn has_rival(&self) -> bool;
@@ -84,9 +83,6 @@ impl<M: OwnMotor + Copy> Device for Driven<M> {
     }
     fn velocity_rad_per_s(&self) -> Option<f32> {
         VelocityDrive::velocity(&self.0, ()).map(AngularVelocity::as_rad_per_s)
-    }
-    fn knows_angle_from_power_on(&self) -> bool {
-        self.0.motor().capabilities().has(Capability::AbsoluteAngle)
     }
     fn link(&self) -> Link {
         self.0.guard().link()

@@ -166,12 +166,13 @@ impl<M: OwnMotor> Own<M> {
     fn update_anyhow(&mut self, drives: bool, step: TimeStep, left: f32, now: Instant) {
         let may_drive = drives && (!step.is_hold() || self.offered.may_repeat);
         // A question that is given back from now on did not enable the drive, and rest that nobody took was not sent.
-        self.switched.take_if(|_| self.power.is_confirmed());
+        self.switched.take_if(|_| self.power.is_confirmed() && self.switching.is_none());
         self.offered.is_rest &= !self.offered.waits;
         self.withdraw();
         self.has_posted = false;
         let was_on = self.power.is_on();
         self.switch(may_drive, now);
+        let may_drive = may_drive && self.guard.is_armed();
         // Before the drive was on for certain, it was polled where rest would have disabled it.
         self.offered.is_rest &= !was_on || self.power.is_on();
         let inquiry = self.inquire(now);
@@ -205,7 +206,7 @@ impl<M: OwnMotor> Own<M> {
             self.motor.forget_settings();
         }
         if self.guard.link() == Link::Offline {
-            self.doubt_zero();
+            self.joint.doubt_zero();
         }
         let is_idle = !self.power.is_on() && !self.has_posted && self.offered.is_rest;
         let is_due = now < self.inquired || now.since(self.inquired) >= INQUIRY;

@@ -14,28 +14,43 @@ pub(super) struct Joint {
 /// The angle of the drive where the joint is at zero.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Zero {
-    /// Given with the configuration.
+    /// The zero of the drive.
+    OfDrive,
+    /// Given with the configuration, within a turn: whole turns are not known before the joint was heard.
     Given(Angle),
+    /// The same, in the turn where the joint was heard first.
+    Placed(Angle),
     /// Set while the drive was on.
     Found(Angle),
-    /// The drive may have lost its supply since, and counts from another angle.
+    /// Found, and the drive may have lost its supply since, so its angle is another.
     Lost,
 }
 
 impl Joint {
     /// The joint turns and counts as its drive.
-    pub(super) const DIRECT: Self = Self { sign: 1.0, zero: Zero::Given(Angle::ZERO) };
+    pub(super) const DIRECT: Self = Self { sign: 1.0, zero: Zero::OfDrive };
 
-    pub(super) const fn lose_zero(&mut self) {
-        if let Zero::Found(_) = self.zero {
-            self.zero = Zero::Lost;
+    /// The drive may have lost its supply. A drive that knows its angle does not know its turns.
+    pub(super) const fn doubt_zero(&mut self) {
+        self.zero = match self.zero {
+            Zero::OfDrive => Zero::OfDrive,
+            Zero::Given(zero) | Zero::Placed(zero) => Zero::Given(zero),
+            Zero::Found(_) | Zero::Lost => Zero::Lost,
+        };
+    }
+
+    /// Places a given zero within half a turn of the angle of the drive.
+    pub(super) fn place_zero(&mut self, measured: Angle) {
+        if let Zero::Given(zero) = self.zero {
+            self.zero = Zero::Placed(measured - (measured - zero).wrapped());
         }
     }
 
     const fn zero(&self) -> Option<Angle> {
         match self.zero {
-            Zero::Given(zero) | Zero::Found(zero) => Some(zero),
-            Zero::Lost => None,
+            Zero::OfDrive => Some(Angle::ZERO),
+            Zero::Placed(zero) | Zero::Found(zero) => Some(zero),
+            Zero::Given(_) | Zero::Lost => None,
         }
     }
 
@@ -79,8 +94,7 @@ impl<M: OwnMotor> VelocityDrive<()> for Own<M> {
 
 impl<M: OwnMotor> AngleDrive<()> for Own<M> {
     fn angle(&self, (): ()) -> Option<Angle> {
-        let measured = self.motor.angle().filter(|_| self.is_online())?;
-        Some((measured - self.joint.zero()?) * self.joint.sign)
+        Some((self.measured_angle()? - self.joint.zero()?) * self.joint.sign)
     }
 
     fn set_angle(&mut self, (): (), target: Angle) -> Result<(), TargetError> {

@@ -46,60 +46,7 @@ const INQUIRY: Duration = Duration::from_millis(10);
 /// Disarmed at start. Late and lost feedback, an old target, a target that is not finite, a second bad time step, a clock that
 /// does not move on and an emergency stop send the [frame of rest](OwnMotor::rest) in the same cycle: [`Guard`] has the rules.
 /// Each update offers a command or the frame of rest. If the drive is to be enabled or disabled, the frame for that comes first.
-///
-/// # Examples
-/// ```
-/// use drivetrain::control::{Pid, PidConfig};
-/// use drivetrain::frame::CanFrame;
-/// use drivetrain::motor::{
-///     Claim, Devices, Ingest, Malformed, MotorName, Order, Own, OwnMotor, Role, Target, VelocityDrive,
-/// };
-/// use drivetrain::time::{Duration, Instant, Tick};
-/// use drivetrain::units::AngularVelocity;
-/// use embedded_can::{Frame, Id, StandardId};
-///
-/// struct Mine { rpm: i16, speed: Pid }
-///
-/// fn id(raw: u16) -> Id { StandardId::new(raw).unwrap_or(StandardId::ZERO).into() }
-///
-/// impl OwnMotor for Mine {
-///     fn name(&self) -> MotorName { MotorName::new("mine", 1) }
-///     fn claims(&self) -> impl IntoIterator<Item = Claim> {
-///         let claim = |raw, role| Claim::new(id(raw), role, self.name());
-///         [claim(0x123, Role::Command), claim(0x124, Role::Feedback)]
-///     }
-///     fn decode(&mut self, frame: &CanFrame) -> Ingest {
-///         let [high, low] = *frame.data() else {
-///             return Ingest::Malformed(Malformed::Length(frame.length()));
-///         };
-///         self.rpm = i16::from_be_bytes([high, low]);
-///         Ingest::Taken
-///     }
-///     fn velocity(&self) -> AngularVelocity { AngularVelocity::from_rpm(self.rpm.into()) }
-///     fn rest(&mut self) -> CanFrame { CanFrame::of(id(0x123), [0, 0]) }
-///     fn control(&mut self, order: Order) -> CanFrame {
-///         let Order { target: Target::Velocity(target), share, step } = order else {
-///             return self.rest();
-///         };
-///         let output = self.speed.step(target.as_rpm(), self.velocity().as_rpm(), &step);
-///         let limit = 1_000.0 * share;
-///         CanFrame::of(id(0x123), (output.clamp(-limit, limit) as i16).to_be_bytes())
-///     }
-///     fn reset(&mut self) { self.speed.reset() }
-/// }
-///
-/// let mine = Mine { rpm: 0, speed: Pid::new(PidConfig::new(2.0, 0.0, 0.0))? };
-/// let mut motor = Own::new(mine).with_opening(Duration::ZERO); // all of the output at once
-/// let now = Instant::from_micros(1_000);
-/// let feedback = CanFrame::of(id(0x124), [0, 50]); // 50 rpm
-/// assert_eq!(motor.ingest(&feedback, now), Ingest::Taken);
-/// motor.arm(now)?;
-/// motor.set_velocity((), AngularVelocity::from_rpm(150.0))?;
-/// motor.update(Tick::new(now, 0.001));
-/// let frame = motor.next_frame(0).ok_or("nothing to send")?;
-/// assert_eq!(format!("{frame:?}"), "123 [2] 00 C8"); // 2 * (150 - 50)
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
+/// [`OwnMotor`] has an example.
 #[derive(Debug, Clone, Copy)]
 pub struct Own<M> {
     motor: M,
@@ -199,23 +146,27 @@ impl<M: OwnMotor> Own<M> {
         self
     }
 
-    /// Takes the angle of the drive at which the joint is at zero: angles are counted from there.
+    /// Takes the angle of the drive at which the joint is at zero, by a calibration. Whole turns are lost with the supply, so the joint
+    /// is within half a turn of its zero when it is heard first, and again after it was offline or has reset.
     ///
     /// # Errors
-    /// [`ConfigError::NotFinite`] for an angle that is not finite.
+    /// [`ConfigError::NotFinite`]; [`ConfigError::Unsupported`] for a drive without [`Capability::AbsoluteAngle`].
     pub fn with_zero(mut self, angle: Angle) -> Result<Self, ConfigError> {
         finite("zero", angle.as_radians())?;
+        if !self.motor.capabilities().has(Capability::AbsoluteAngle) {
+            return Err(ConfigError::Unsupported("zero"));
+        }
         self.joint.zero = Zero::Given(angle);
         Ok(self)
     }
 
     /// Makes the present angle of the joint so much; the shaft follows its target as before.
     ///
-    /// A drive without [`Capability::AbsoluteAngle`] counts from another angle after it lost its supply. Once such a drive was offline or
-    /// has reset, the joint has no angle, and targets with an angle are refused as [`TargetError::NotHomed`], until this is called again.
+    /// A drive that lost its supply counts from another angle, or in another turn. Once a drive was silent for 100 ms or has reset, the joint
+    /// has no angle, and targets with an angle are refused as [`TargetError::NotHomed`], until this is called again.
     ///
     /// # Errors
-    /// [`TargetError::NoFeedback`] without fresh feedback with an angle, and [`TargetError::NotFinite`].
+    /// [`TargetError::NoFeedback`] without fresh feedback with an angle, [`TargetError::NotFinite`] for an angle beyond 10 000 rad.
     ///
     /// # Examples
     /// ```
@@ -234,16 +185,16 @@ impl<M: OwnMotor> Own<M> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn set_present_angle(&mut self, angle: Angle) -> Result<(), TargetError> {
-        let measured = self.motor.angle().filter(|_| self.is_online());
-        let zero = measured.ok_or(TargetError::NoFeedback)? - angle * self.joint.sign;
-        if !zero.is_finite() {
+        let measured = self.measured_angle().ok_or(TargetError::NoFeedback)?;
+        if !(angle.as_radians().abs() <= 1e4) {
             return Err(TargetError::NotFinite);
         }
-        self.joint.zero = Zero::Found(zero);
+        self.joint.zero = Zero::Found(measured - angle * self.joint.sign);
         Ok(())
     }
 
-    /// Changes the motor's loops of this crate, from rad to rad/s and from rad/s to Nm, also while the motor is driven.
+    /// Changes the motor's loops of this crate, from rad to rad/s and from rad/s to Nm, also while the motor is driven: each goes on as
+    /// after [`Pid::set_gains`](crate::control::Pid::set_gains), so a larger gain of the position asks for more velocity at once.
     ///
     /// # Errors
     /// As [`OwnMotor::set_loops`].
@@ -321,12 +272,16 @@ impl<M: OwnMotor> Own<M> {
         if !self.motor.capabilities().has(kind) {
             return Err(TargetError::Unsupported);
         }
-        let target = self.joint.target_of_drive(target)?;
         // Where there was no target, the command is of one before.
         self.offered.may_repeat &= self.guard.has_target();
-        self.guard.admit(target.is_finite())?;
-        self.target = target;
+        let of_drive = self.joint.target_of_drive(target);
+        self.guard.admit(of_drive.unwrap_or(target).is_finite())?;
+        self.target = of_drive.inspect_err(|_| self.guard.relax())?;
         Ok(())
+    }
+
+    fn measured_angle(&self) -> Option<Angle> {
+        self.motor.angle().filter(|_| self.is_online())
     }
 
     fn is_online(&self) -> bool {
@@ -343,6 +298,12 @@ impl<M: OwnMotor> Own<M> {
         }
         let outcome = self.motor.decode(frame);
         if outcome == Ingest::Taken {
+            if self.guard.ends_silence(now) {
+                self.doubt_supply();
+            }
+            if let (Zero::Given(_), Some(measured)) = (self.joint.zero, self.motor.angle()) {
+                self.joint.place_zero(measured);
+            }
             self.watch.hear(&self.guard, now);
             self.guard.hear(now);
             self.hear_power(now);
@@ -379,8 +340,7 @@ impl<M: OwnMotor> Own<M> {
     fn hear_power(&mut self, now: Instant) {
         if self.power.hear(self.motor.is_enabled(), now) {
             self.fail(now);
-            self.motor.forget_settings();
-            self.doubt_zero();
+            self.doubt_supply();
         }
     }
 
@@ -392,9 +352,9 @@ impl<M: OwnMotor> Own<M> {
     }
 
     /// The drive may have lost its supply.
-    fn doubt_zero(&mut self) {
-        if !self.motor.capabilities().has(Capability::AbsoluteAngle) {
-            self.joint.lose_zero();
-        }
+    #[cold]
+    fn doubt_supply(&mut self) {
+        self.motor.forget_settings();
+        self.joint.doubt_zero();
     }
 }

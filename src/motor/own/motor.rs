@@ -14,6 +14,60 @@ use crate::wire::mit::{self, Ranges};
 ///
 /// [`Own`](super::Own) makes a device of the motor, with everything in common to all motors. The example `custom_motor` is a
 /// whole motor. The family [`damiao`](crate::damiao) has drives to be enabled and asked for settings first.
+///
+/// # Examples
+/// ```
+/// use drivetrain::control::{Pid, PidConfig};
+/// use drivetrain::frame::CanFrame;
+/// use drivetrain::motor::{
+///     Claim, Devices, Ingest, Malformed, MotorName, Order, Own, OwnMotor, Role, Target, VelocityDrive,
+/// };
+/// use drivetrain::time::{Duration, Instant, Tick};
+/// use drivetrain::units::AngularVelocity;
+/// use embedded_can::{Frame, Id, StandardId};
+///
+/// struct Mine { rpm: i16, speed: Pid }
+///
+/// fn id(raw: u16) -> Id { StandardId::new(raw).unwrap_or(StandardId::ZERO).into() }
+///
+/// impl OwnMotor for Mine {
+///     fn name(&self) -> MotorName { MotorName::new("mine", 1) }
+///     fn claims(&self) -> impl IntoIterator<Item = Claim> {
+///         let claim = |raw, role| Claim::new(id(raw), role, self.name());
+///         [claim(0x123, Role::Command), claim(0x124, Role::Feedback)]
+///     }
+///     fn decode(&mut self, frame: &CanFrame) -> Ingest {
+///         let [high, low] = *frame.data() else {
+///             return Ingest::Malformed(Malformed::Length(frame.length()));
+///         };
+///         self.rpm = i16::from_be_bytes([high, low]);
+///         Ingest::Taken
+///     }
+///     fn velocity(&self) -> AngularVelocity { AngularVelocity::from_rpm(self.rpm.into()) }
+///     fn rest(&mut self) -> CanFrame { CanFrame::of(id(0x123), [0, 0]) }
+///     fn control(&mut self, order: Order) -> CanFrame {
+///         let Order { target: Target::Velocity(target), share, step } = order else {
+///             return self.rest();
+///         };
+///         let output = self.speed.step(target.as_rpm(), self.velocity().as_rpm(), &step);
+///         let limit = 1_000.0 * share;
+///         CanFrame::of(id(0x123), (output.clamp(-limit, limit) as i16).to_be_bytes())
+///     }
+///     fn reset(&mut self) { self.speed.reset() }
+/// }
+///
+/// let mine = Mine { rpm: 0, speed: Pid::new(PidConfig::new(2.0, 0.0, 0.0))? };
+/// let mut motor = Own::new(mine).with_opening(Duration::ZERO); // all of the output at once
+/// let now = Instant::from_micros(1_000);
+/// let feedback = CanFrame::of(id(0x124), [0, 50]); // 50 rpm
+/// assert_eq!(motor.ingest(&feedback, now), Ingest::Taken);
+/// motor.arm(now)?;
+/// motor.set_velocity((), AngularVelocity::from_rpm(150.0))?;
+/// motor.update(Tick::new(now, 0.001));
+/// let frame = motor.next_frame(0).ok_or("nothing to send")?;
+/// assert_eq!(format!("{frame:?}"), "123 [2] 00 C8"); // 2 * (150 - 50)
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub trait OwnMotor {
     /// Returns how the motor is called in errors.
     fn name(&self) -> MotorName;

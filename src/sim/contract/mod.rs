@@ -107,8 +107,8 @@ pub enum Rule {
     MissingAreNamed,
     /// With feedback of all motors, arming succeeds, and a target then leads to a command.
     ArmedDrives,
-    /// While the output range opens after arming, commands to one target change; their effort, if known, is below 0.6 in the first quarter, and
-    /// never above 1.
+    /// While the output range opens after arming, commands to one target change. Their effort, if known, is at most 0.02 and 1.25 times the
+    /// elapsed share of the opening, and never above 1.
     OpensFromZero,
     /// Foreign, remote and extended frames are handed back and change nothing (I5).
     ForeignIsUnrelated,

@@ -91,7 +91,7 @@ fn opening<S: Subject>(mut run: Run<S>) -> Outcome {
         _ = run.subject.drive(1.0);
         let Output { effort, last, driving, .. } = run.step()?;
         first = first.or(last.filter(|_| driving > 0));
-        let most = if ms < opening_ms / 4 { 0.6 } else { 1.001 };
+        let most = (0.02 + 1.25 * ms as f32 / opening_ms as f32).min(1.001);
         run.expect(effort <= most, Rule::OpensFromZero)?;
     }
     _ = run.subject.drive(1.0);
