@@ -16,7 +16,7 @@ use drivetrain::geometry::Vec3;
 use drivetrain::manipulator::{ArmJoint, SerialArm};
 use drivetrain::motor::{AngleDrive, Devices, Impedance, ImpedanceControl, Own};
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::sim::{DamiaoDrive, DriveShaft, Line, Sender, Simulation};
+use drivetrain::sim::{DamiaoDrive, DriveShaft, Line, Simulation};
 use drivetrain::time::Duration;
 use drivetrain::units::Angle;
 use output::console;
@@ -116,10 +116,8 @@ struct Sample {
 }
 
 fn drive(part: Part, angle_deg: f32) -> DamiaoDrive {
-    let model = part.model;
-    let ranges = [model.pmax_rad(), model.vmax_rad_per_s(), model.tmax_nm()];
-    let mut drive = DamiaoDrive::new(part.id, 0x10 + u16::from(part.id), ranges)
-        .with_shaft(DriveShaft::new(part.inertia, 0.02));
+    let shaft = DriveShaft::new(part.inertia, 0.02);
+    let mut drive = DamiaoDrive::of(part.model, part.id).with_shaft(shaft);
     drive.shaft_mut().set_angle(angle_deg.to_radians());
     drive
 }
@@ -133,21 +131,13 @@ fn simulate() -> Result<Vec<Sample>, Box<dyn Error>> {
     let mut runner = Runner::new(Nb(world.controller()), world.clock(), arm);
     let mut samples = Vec::new();
     for ms in 0..END {
-        let mut answers = Vec::new();
-        world.advance_with(Duration::from_millis(1), |record| {
-            if record.sender == Sender::Controller {
-                answers.extend(drives.iter_mut().filter_map(|drive| drive.hear(&record.frame)));
-            }
-        });
-        for answer in answers {
-            world.inject(Line::Can1, answer).map_err(|_| "the bus is full")?;
-        }
         let angles = drives.map(|drive| drive.shaft().angle_rad());
         for (drive, weight_nm) in drives.iter_mut().zip(weight_nm(angles)) {
             // Held by hand until the motors do.
             drive.shaft_mut().set_load(if ms > ARMED + 200 { -weight_nm } else { 0.0 });
-            (0..4).for_each(|_| drive.step(0.00025));
         }
+        let mut on_bus = drives.each_mut().map(|drive| (Line::Can1, drive as _));
+        world.advance_drives(Duration::from_millis(1), &mut on_bus)?;
         runner.poll(16);
         let Some(tick) = runner.due() else { continue };
         if ms == ARMED {
@@ -173,7 +163,7 @@ fn simulate() -> Result<Vec<Sample>, Box<dyn Error>> {
         }
         samples.push(Sample {
             time_s: ms as f32 * 1e-3,
-            angles_deg: angles.map(f32::to_degrees),
+            angles_deg: drives.map(|drive| drive.shaft().angle_rad().to_degrees()),
             torques_nm: drives.map(|drive| drive.shaft().torque_nm()),
         });
     }

@@ -155,7 +155,7 @@ fn drive(imu_dies: bool) -> Result<(Vec<Sample>, u32), Box<dyn Error>> {
         let time_s = gimbal.time_s();
         if !(imu_dies && time_s >= FAULT_S) {
             if let Some(frame) = gimbal.imu_frame() {
-                world.inject(Line::Can1, frame).map_err(|_| "the IMU has no room")?;
+                world.inject(Line::Can1, frame)?;
             }
         }
         gimbal.advance(Duration::from_micros(500));

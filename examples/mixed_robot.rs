@@ -18,7 +18,7 @@ use drivetrain::motor::{
 };
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{
-    ChassisConfig, DamiaoDrive, DriveShaft, Line, MotorConfig, MotorKey, Sender, Simulation,
+    ChassisConfig, DamiaoDrive, DriveShaft, Line, MotorConfig, MotorKey, SimError, Simulation,
     VescDrive, VescMotor, Wheel,
 };
 use drivetrain::time::{Duration, Edge};
@@ -103,7 +103,7 @@ struct Drives {
 
 impl Drives {
     fn new() -> Self {
-        let pitch = DamiaoDrive::new(1, 0x11, [12.5, 30.0, 10.0]);
+        let pitch = DamiaoDrive::of(damiao::Model::J4310, 1);
         let motor = VescMotor {
             pole_pairs: 7,
             gear: 1.0,
@@ -111,34 +111,21 @@ impl Drives {
             current_max_a: 60.0,
             no_load_rad_per_s: 600.0,
         };
-        let shooter = VescDrive::new(23, motor).with_timeout(0.1, 0.0);
+        let shooter = VescDrive::new(23, motor).with_timeout(0.1, 0.0).with_status_hz(500.0);
         Self {
             pitch: pitch.with_shaft(DriveShaft::new(0.02, 0.02)),
             shooter: shooter.with_shaft(DriveShaft::new(0.001, 0.000_2)),
         }
     }
 
-    /// Moves the world on by 1 ms with both drives on the second bus. The VESC reports its speed at 500 Hz.
-    fn step(&mut self, world: &Simulation, ms: u64) -> Result<(), Box<dyn Error>> {
-        let mut answers = Vec::new();
-        if ms.is_multiple_of(2) {
-            answers.extend(self.shooter.report(9));
-        }
-        world.advance_with(Duration::from_millis(1), |record| {
-            if (record.line, record.sender) == (Line::Can2, Sender::Controller) {
-                answers.extend(self.pitch.hear(&record.frame));
-                answers.extend(self.shooter.hear(&record.frame));
-            }
-        });
-        for answer in answers {
-            world.inject(Line::Can2, answer).map_err(|_| "the second bus is full")?;
-        }
+    /// Moves the world on by 1 ms with both drives on the second bus.
+    fn step(&mut self, world: &Simulation, ms: u64) -> Result<(), SimError> {
         // Held by hand until the motor does, and when it no longer does.
         let is_held = !(ARMED + 300..STOPPED).contains(&ms);
         self.pitch.shaft_mut().set_load(if is_held { 0.0 } else { -WEIGHT_NM });
-        (0..4).for_each(|_| self.pitch.step(0.000_25));
-        self.shooter.step(0.001);
-        Ok(())
+        let Self { pitch, shooter } = self;
+        let tick = Duration::from_millis(1);
+        world.advance_drives(tick, &mut [(Line::Can2, pitch), (Line::Can2, shooter)])
     }
 }
 

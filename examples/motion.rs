@@ -65,22 +65,13 @@ struct Sample {
 
 fn simulate() -> Result<Vec<Sample>, Box<dyn Error>> {
     let world = Simulation::new(1);
-    let ranges = [MODEL.pmax_rad(), MODEL.vmax_rad_per_s(), MODEL.tmax_nm()];
-    let mut drive =
-        DamiaoDrive::new(1, 0x11, ranges).with_shaft(DriveShaft::new(INERTIA, FRICTION_NM));
+    let mut drive = DamiaoDrive::of(MODEL, 1).with_shaft(DriveShaft::new(INERTIA, FRICTION_NM));
     let joint = Own::new(Motor::new(MODEL, 1, ImpedanceControl::new(LIMIT_NM)?)?);
     let mut runner = Runner::new(Nb(world.controller()), world.clock(), joint);
     let mut follower = MotionFollower::new([ProfileState::default()]);
     let mut samples = Vec::new();
     for ms in 0..END {
-        let mut answer = None;
-        world.advance_with(Duration::from_millis(1), |record| {
-            answer = drive.hear(&record.frame).or(answer);
-        });
-        if let Some(answer) = answer {
-            world.inject(Line::Can1, answer).map_err(|_| "the bus is full")?;
-        }
-        (0..4).for_each(|_| drive.step(0.25 * DT_S));
+        world.advance_drives(Duration::from_millis(1), &mut [(Line::Can1, &mut drive)])?;
         runner.poll(16);
         let Some(tick) = runner.due() else { continue };
         if ms == ARMED {

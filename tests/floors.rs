@@ -122,12 +122,18 @@ const FACTS: [&str; 11] = [
     "dji",
 ];
 
+/// The same of the families with simulated drives: the models.
+const DRIVE_FACTS: [&str; 1] = ["Model"];
+
 /// The same of the joints.
 const JOINT_FACTS: [&str; 4] = ["IDS", "PULSES_PER_TURN", "Register", "self"];
 
 fn strangers(text: &str) -> Vec<String> {
     let mut found = other_than("dji", &FACTS, text);
     found.extend(other_than("snake", &JOINT_FACTS, text));
+    for family in ["damiao", "lk", "odrive", "rmd", "robstride", "vesc"] {
+        found.extend(other_than(family, &DRIVE_FACTS, text));
+    }
     found
 }
 
@@ -256,6 +262,7 @@ fn the_check_itself_finds_what_it_should() {
     assert!(!knows_chassis("use super::chassis::Chassis;"));
     assert_eq!(strangers("use crate::snake::{Joints, Register};").len(), 1);
     assert_eq!(strangers("use crate::dji::{Bus, Facts};").len(), 1);
+    assert_eq!(strangers("use crate::lk::{Feedback, Model};").len(), 1);
     assert!(
         violations(
             "dji",

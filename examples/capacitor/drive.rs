@@ -186,7 +186,7 @@ pub(crate) fn run(has_burst: bool, lost: Lost) -> Result<Vec<Sample>, Box<dyn Er
         let power = |key: &MotorKey| world.motor(*key).map_or(0.0, |state| state.power_w);
         let frame = supply.step(keys.iter().map(power).sum(), now)?;
         if let Some(frame) = frame.filter(|_| !(lost.capacitor && time_s >= LOST_S)) {
-            world.inject(Line::Can1, frame).map_err(|_| "no room for the controller's frame")?;
+            world.inject(Line::Can1, frame)?;
         }
         let mut buffer = [0; 64];
         let mut received = supply.receive(now, &mut buffer);

@@ -9,9 +9,7 @@ use drivetrain::motor::{
     AngleDrive, CanDevice, Devices, Impedance, ImpedanceControl, Ingest, Own, OwnMotor, Role,
     VelocityDrive,
 };
-use drivetrain::sim::{
-    DamiaoDrive, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive, VescMotor,
-};
+use drivetrain::sim::{DamiaoDrive, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive, VescMotor};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use drivetrain::{damiao, lk, odrive, rmd, robstride, vesc};
@@ -72,7 +70,7 @@ impl Limits {
 fn damiao_of(kind: u8, input: &mut Input) {
     fn bench(mode: impl Into<damiao::Mode>, number: f32, input: &mut Input) {
         let motor = damiao::Motor::new(damiao::Model::J4310, 1, mode).unwrap();
-        let drive = DamiaoDrive::new(1, 0x11, [12.5, 30.0, 10.0]).with_register(10, number);
+        let drive = DamiaoDrive::of(damiao::Model::J4310, 1).with_register(10, number);
         let limits = Limits { rest_nm: 10.0 / 4095.0, ..Limits::REST };
         run(motor, drive, limits, |motor, kind, value| {
             use damiao::Register;
@@ -103,11 +101,8 @@ fn damiao_of(kind: u8, input: &mut Input) {
 fn lk_of(kind: u8, input: &mut Input) {
     fn bench(mode: impl Into<lk::Mode>, limits: Limits, input: &mut Input) {
         let model = lk::Model::MG4005E_I10;
-        let amperes = model.series().amperes_per_count();
-        let (constant, gear) = (model.torque_constant(), model.gear());
-        let drive = LkDrive::new(1, amperes, constant, gear, model.encoder_bits());
         let motor = lk::Motor::new(model, 1, mode).unwrap();
-        run(motor, drive, limits, |_, _, _| {})(input);
+        run(motor, LkDrive::of(model, 1), limits, |_, _, _| {})(input);
     }
     let rest = Limits::REST;
     match kind % 4 {
@@ -153,7 +148,8 @@ fn vesc_of(kind: u8, input: &mut Input) {
             no_load_rad_per_s: 300.0,
         };
         let motor_of = vesc::Motor::new(MODEL, 23, mode).unwrap();
-        run(motor_of, VescDrive::new(23, motor), limits, |_, _, _| {})(input);
+        let drive = VescDrive::new(23, motor).with_status_hz(1_000.0);
+        run(motor_of, drive, limits, |_, _, _| {})(input);
     }
     let rest = Limits::REST;
     match kind % 4 {
@@ -208,14 +204,8 @@ fn robstride_of(kind: u8, input: &mut Input) {
         number: f32,
         input: &mut Input,
     ) {
-        let (kp, kd) = (500.0, 5.0);
-        let ranges = [model.pmax_rad(), model.vmax_rad_per_s(), model.tmax_nm(), kp, kd];
-        let drive = match model.has_timeout() {
-            true => RobStrideDrive::new(1, ranges),
-            false => RobStrideDrive::cybergear(1),
-        };
         let limits = Limits { rest_nm: model.tmax_nm() / 65_535.0, ..Limits::REST };
-        let drive = drive.with_parameter(0x7005, number);
+        let drive = RobStrideDrive::of(model, 1).with_parameter(0x7005, number);
         let motor = robstride::Motor::new(model, 1, mode).unwrap();
         run(motor, drive, limits.most(3.0), |motor, kind, value| {
             use robstride::Register;
@@ -479,6 +469,6 @@ impl<M: OwnMotor + Copy + Debug, D: Drive> Bench<M, D> {
         assert!(is_at_rest || self.may_drive() || self.owed > 0, "{torque_nm} Nm at rest");
         assert!(torque_nm.abs() <= self.limits.most_nm, "{torque_nm} Nm");
         self.drive.step(0.00099);
-        self.drive.report(&mut self.answers);
+        self.answers.extend(core::iter::from_fn(|| self.drive.next_frame()));
     }
 }

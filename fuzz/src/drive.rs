@@ -1,23 +1,9 @@
 //! The simulated drives that judge own motors.
 
-use drivetrain::frame::CanFrame;
-use drivetrain::sim::{
-    DamiaoDrive, DriveShaft, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive,
-};
+use drivetrain::sim::{self, DamiaoDrive, DriveShaft, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive};
 
 /// A simulated drive.
-pub trait Drive {
-    /// Takes a frame from the bus and returns the answer.
-    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame>;
-
-    /// Moves on by a time in s.
-    fn step(&mut self, dt_s: f32);
-
-    /// Appends the frames that the drive sends by itself.
-    fn report(&mut self, frames: &mut Vec<CanFrame>) {
-        _ = frames;
-    }
-
+pub trait Drive: sim::Drive {
     /// Whether the next frame may be sent back, while the command before holds again.
     fn sends_back(&self) -> bool {
         false
@@ -29,23 +15,10 @@ pub trait Drive {
     fn suffer(&mut self, kind: u8);
 }
 
-/// The methods that the drives have by themselves.
-macro_rules! forward {
-    () => {
-        fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
-            Self::hear(self, frame)
-        }
-        fn step(&mut self, dt_s: f32) {
-            Self::step(self, dt_s);
-        }
-        fn shaft_mut(&mut self) -> &mut DriveShaft {
-            Self::shaft_mut(self)
-        }
-    };
-}
-
 impl Drive for DamiaoDrive {
-    forward!();
+    fn shaft_mut(&mut self) -> &mut DriveShaft {
+        self.shaft_mut()
+    }
     fn suffer(&mut self, kind: u8) {
         match kind % 2 {
             0 => self.fail(8 + kind % 7),
@@ -55,7 +28,9 @@ impl Drive for DamiaoDrive {
 }
 
 impl Drive for LkDrive {
-    forward!();
+    fn shaft_mut(&mut self) -> &mut DriveShaft {
+        self.shaft_mut()
+    }
     fn suffer(&mut self, kind: u8) {
         match kind % 4 {
             0 => self.fail(kind >> 2),
@@ -67,9 +42,8 @@ impl Drive for LkDrive {
 }
 
 impl Drive for RmdDrive {
-    forward!();
-    fn report(&mut self, frames: &mut Vec<CanFrame>) {
-        frames.extend(Self::report(self));
+    fn shaft_mut(&mut self) -> &mut DriveShaft {
+        self.shaft_mut()
     }
     /// After its time-out.
     fn sends_back(&self) -> bool {
@@ -86,9 +60,8 @@ impl Drive for RmdDrive {
 }
 
 impl Drive for VescDrive {
-    forward!();
-    fn report(&mut self, frames: &mut Vec<CanFrame>) {
-        frames.extend([27, 16, 9].into_iter().filter_map(|packet| Self::report(self, packet)));
+    fn shaft_mut(&mut self) -> &mut DriveShaft {
+        self.shaft_mut()
     }
     fn suffer(&mut self, kind: u8) {
         match kind % 4 {
@@ -101,9 +74,8 @@ impl Drive for VescDrive {
 }
 
 impl Drive for OdriveDrive {
-    forward!();
-    fn report(&mut self, frames: &mut Vec<CanFrame>) {
-        frames.extend(core::iter::from_fn(|| self.next_frame()));
+    fn shaft_mut(&mut self) -> &mut DriveShaft {
+        self.shaft_mut()
     }
     fn suffer(&mut self, kind: u8) {
         match kind % 4 {
@@ -117,7 +89,9 @@ impl Drive for OdriveDrive {
 }
 
 impl Drive for RobStrideDrive {
-    forward!();
+    fn shaft_mut(&mut self) -> &mut DriveShaft {
+        self.shaft_mut()
+    }
     fn suffer(&mut self, kind: u8) {
         match kind % 3 {
             0 => self.fail(1 << (kind >> 3)),

@@ -10,7 +10,7 @@ use crate::{Defect, Outcome};
 use drivetrain::frame::CanFrame;
 use drivetrain::lk::{Command, Feedback, Mode, Model, Motor, State};
 use drivetrain::motor::{AngleDrive, Devices, ImpedanceControl, Own, OwnMotor, VelocityDrive};
-use drivetrain::sim::{DriveShaft, LkDrive};
+use drivetrain::sim::{Drive, DriveShaft, LkDrive};
 use drivetrain::time::{Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use std::fmt::Write as _;
@@ -124,20 +124,12 @@ pub fn decode(
 }
 
 /// A simulated drive that is served.
-pub trait Served {
-    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame>;
-    fn step(&mut self, dt_s: f32);
+pub trait Served: Drive {
     fn fail(&mut self, errors: u16);
     fn shaft(&self) -> (DriveShaft, bool, u16);
 }
 
 impl Served for LkDrive {
-    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
-        self.hear(frame)
-    }
-    fn step(&mut self, dt_s: f32) {
-        self.step(dt_s);
-    }
     fn fail(&mut self, errors: u16) {
         self.fail(errors.to_le_bytes()[0]);
     }
@@ -223,7 +215,7 @@ fn tell(answer: &mut String, frame: &CanFrame) {
 }
 
 fn drive_of(id: u8) -> LkDrive {
-    LkDrive::new(id, 33.0 / 4096.0, 0.32, 1.0, 16)
+    LkDrive::of(Model::MF9025_16T, id)
 }
 
 fn frames_of(id: u8, mode: &str) -> Outcome<Vec<CanFrame>> {

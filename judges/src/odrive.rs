@@ -18,7 +18,7 @@ use crate::defect::defects;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{AngleDrive, Devices, ImpedanceControl, Own, VelocityDrive};
 use drivetrain::odrive::{Command, Feedback, Firmware, Heartbeat, Mode, Model, Motor};
-use drivetrain::sim::OdriveDrive;
+use drivetrain::sim::{Drive, OdriveDrive};
 use drivetrain::time::{Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use embedded_can::{Frame, StandardId};

@@ -57,12 +57,6 @@ fn drive_of(id: u8) -> RmdDrive {
 }
 
 impl Served for RmdDrive {
-    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
-        self.hear(frame)
-    }
-    fn step(&mut self, dt_s: f32) {
-        self.step(dt_s);
-    }
     fn fail(&mut self, errors: u16) {
         self.fail(errors);
     }

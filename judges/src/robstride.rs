@@ -18,7 +18,7 @@
 use crate::{Defect, Outcome};
 use drivetrain::frame::CanFrame;
 use drivetrain::robstride::{Command, Feedback, Model, Register};
-use drivetrain::sim::RobStrideDrive;
+use drivetrain::sim::{Drive, RobStrideDrive};
 use drivetrain::wire::mit::{self, Ranges};
 use embedded_can::ExtendedId;
 use std::fmt::Write as _;
@@ -152,9 +152,12 @@ fn serve(defect: Defect, input: impl BufRead, output: &mut impl Write) -> Outcom
                 let id = id.parse()?;
                 let numbers: Vec<f32> =
                     ranges.iter().map(|number| number.parse()).collect::<Result<_, _>>()?;
-                let ranges = numbers.try_into().map_err(|_| "five ranges are needed")?;
+                let &[p, v, t, kp, kd] = &numbers[..] else {
+                    return Err("five ranges are needed".into());
+                };
+                let model = Model::new("", Ranges::new(p, v, t)?.with_gains(kp, kd)?, 1.0)?;
                 drives.retain(|(other, _)| *other != id);
-                drives.push((id, RobStrideDrive::new(id, ranges)));
+                drives.push((id, RobStrideDrive::of(model, id)));
             }
             ["hear", id, data] => {
                 answer.clear();

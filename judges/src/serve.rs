@@ -20,7 +20,7 @@ use crate::{Defect, Outcome, model_named, register_of};
 use drivetrain::damiao::{Mode, Model, Motor};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{AngleDrive, Devices, ImpedanceControl, Own, VelocityDrive};
-use drivetrain::sim::DamiaoDrive;
+use drivetrain::sim::{DamiaoDrive, Drive};
 use drivetrain::time::{Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use drivetrain::wire::mit;
@@ -54,10 +54,13 @@ pub fn serve(defect: Defect, input: impl BufRead, output: &mut impl Write) -> Ou
                 }
             }
             ["drive", id, master, p, v, t] => {
-                let ranges = [p.parse()?, v.parse()?, t.parse()?];
                 let id = id.parse()?;
+                let mut drive = DamiaoDrive::of(Model::J4310, id);
+                for (register, value) in [(7, master), (21, p), (22, v), (23, t)] {
+                    drive = drive.with_register(register, value.parse()?);
+                }
                 drives.retain(|(other, _)| *other != id);
-                drives.push((id, DamiaoDrive::new(id, master.parse()?, ranges)));
+                drives.push((id, drive));
                 answer.push_str("ok");
             }
             ["hear", id, data] => {
@@ -181,9 +184,7 @@ impl Bench {
         mode: impl Into<Mode>,
     ) -> Outcome<Box<dyn Station>> {
         let own = Own::new(Motor::new(*model, id, mode)?);
-        let ranges = [model.pmax_rad(), model.vmax_rad_per_s(), model.tmax_nm()];
-        let drive =
-            DamiaoDrive::new(id, u16::from(id) + 0x10, ranges).with_register(10, number.into());
+        let drive = DamiaoDrive::of(*model, id).with_register(10, number.into());
         Ok(Box::new(Self { own, drive, now_us: 1_000, sent: Vec::new() }))
     }
 

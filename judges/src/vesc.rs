@@ -17,7 +17,7 @@ use crate::Outcome;
 use drivetrain::encoder::GearRatio;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{CanDevice, Ingest, Own, OwnMotor};
-use drivetrain::sim::{VescDrive, VescMotor};
+use drivetrain::sim::{Drive, VescDrive, VescMotor};
 use drivetrain::time::Instant;
 use drivetrain::units::AngularVelocity;
 use drivetrain::vesc::{Command, Feedback, Mode, Model, Motor};

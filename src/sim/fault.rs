@@ -343,6 +343,8 @@ pub enum SimError {
     TooManyFaults,
     /// The fault belongs to an ESC, and the motor is a joint: a joint can be silent or without supply.
     NoFaultOfJoint,
+    /// 64 frames of foreign nodes and drives wait on this bus already.
+    BusFull(Line),
     /// The controller is bus-off.
     BusOff,
     /// Frames were missed because the receive queue was full. Reported once; the frames before are still there.
@@ -367,6 +369,9 @@ impl core::fmt::Display for SimError {
             ),
             Self::NoFaultOfJoint => {
                 f.write_str("a joint can be silent or without supply, and has no other fault")
+            }
+            Self::BusFull(line) => {
+                write!(f, "64 frames wait on {line:?} already: advance the time first")
             }
             Self::BusOff => f.write_str("the controller is bus-off"),
             Self::Overrun => f.write_str("frames were missed: the receive queue was full"),

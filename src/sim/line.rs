@@ -41,11 +41,11 @@ pub enum Sender {
 ///
 /// let world = Simulation::new(1);
 /// let frame = CanFrame::standard(0x201, [0x0E, 0x16, 0, 0, 0xFF, 0xFD, 0x21, 0]).ok_or("id")?;
-/// world.inject(Line::Can1, frame).map_err(|_| "full")?;
+/// world.inject(Line::Can1, frame)?;
 /// let mut log = String::new();
 /// world.advance_with(Duration::from_millis(1), |record| log += &record.to_string());
 /// assert_eq!(log, "(0.000117) can0 201#0E160000FFFD2100");
-/// # Ok::<(), &str>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -20,6 +20,7 @@
 //! | [`Simulation`] | the three buses, up to 16 motors and 12 joints, and the time |
 //! | [`MotorConfig`], [`JointConfig`] | a motor to attach, or a joint of a snake robot with its drive |
 //! | [`MotorKey`], [`MotorState`] | an attached motor or joint, and its true state |
+//! | [`Drive`], [`DamiaoDrive`], [`RobStrideDrive`], [`LkDrive`], [`RmdDrive`], [`VescDrive`], [`OdriveDrive`] | a drive of another family, put on a bus by [`Simulation::advance_drives`] |
 //! | [`ChassisConfig`], [`Wheel`], [`ChassisState`] | a body on wheels of any layout, and its true state |
 //! | [`SerialLine`] | a serial line that takes its time, and damages bytes |
 //! | [`Controller`] | the driver's end of a bus |
@@ -68,8 +69,7 @@
 //!
 //! # A node of your own
 //! A test can play any other node of a bus: read each frame in [`Simulation::advance_with`] and answer with
-//! [`Simulation::inject`]. Injected frames are shown too: a drive with one id for both directions ([`LkDrive`]) answers its own answers
-//! unless it hears frames of [`Sender::Controller`] alone.
+//! [`Simulation::inject`]. Injected frames are shown too. A motor drive of your own implements [`Drive`].
 
 pub mod contract;
 
@@ -97,7 +97,8 @@ use motor::{JOINTS, MOTORS};
 pub use can::{INTERMISSION_BITS, frame_bits, nominal_bits, worst_case_bits};
 pub use chassis::{ChassisConfig, ChassisState, Wheel};
 pub use drive::{
-    DamiaoDrive, DriveShaft, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive, VescMotor,
+    DamiaoDrive, Drive, DriveShaft, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive,
+    VescMotor,
 };
 pub use fault::{Fault, SimError};
 pub use joint::JointConfig;
@@ -300,9 +301,10 @@ impl Simulation {
     /// Sends a frame from a foreign node, after its pending frames.
     ///
     /// # Errors
-    /// Gives the frame back when 64 wait already.
-    pub fn inject(&self, line: Line, frame: CanFrame) -> Result<(), CanFrame> {
-        self.with(|engine| engine.wire_mut(line).foreign.push(frame))
+    /// [`SimError::BusFull`] when 64 wait already.
+    pub fn inject(&self, line: Line, frame: CanFrame) -> Result<(), SimError> {
+        let pushed = self.with(|engine| engine.wire_mut(line).foreign.push(frame));
+        pushed.map_err(|_| SimError::BusFull(line))
     }
 
     /// Lets something go wrong for a while: `from..until`, `from..`, or `..` for ever.

@@ -4,7 +4,7 @@ use super::*;
 use drivetrain::control::PidConfig;
 use drivetrain::damiao::{Mode, Model, Motor};
 use drivetrain::motor::{AngleDrive, Impedance, ImpedanceControl};
-use drivetrain::sim::DamiaoDrive;
+use drivetrain::sim::{DamiaoDrive, Drive as _};
 use drivetrain::units::Angle;
 use std::cell::{Cell, RefCell};
 
@@ -21,7 +21,7 @@ struct Joint {
 
 impl Joint {
     fn new(mode: impl Into<Mode>, number: f32, set: Drive) -> Self {
-        let drive = DamiaoDrive::new(1, 0x11, [12.5, 30.0, 10.0]).with_register(10, number);
+        let drive = DamiaoDrive::of(Model::J4310, 1).with_register(10, number);
         Self {
             motor: Own::new(Motor::new(Model::J4310, 1, mode).unwrap()),
             drive: RefCell::new(drive),

@@ -4,7 +4,7 @@ use super::*;
 use drivetrain::control::PidConfig;
 use drivetrain::lk::{Mode, Model, Motor};
 use drivetrain::motor::{AngleDrive, Impedance, ImpedanceControl};
-use drivetrain::sim::LkDrive;
+use drivetrain::sim::{Drive as _, LkDrive};
 use drivetrain::units::Angle;
 use std::cell::{Cell, RefCell};
 
@@ -23,7 +23,7 @@ impl Wheel {
     fn new(mode: impl Into<Mode>, set: Drive) -> Self {
         Self {
             motor: Own::new(Motor::new(Model::MG5010E_I10, 1, mode).unwrap()),
-            drive: RefCell::new(LkDrive::new(1, 66.0 / 4096.0, 1.0, 10.0, 16)),
+            drive: RefCell::new(LkDrive::of(Model::MG5010E_I10, 1)),
             answer: Cell::new(None),
             set,
         }

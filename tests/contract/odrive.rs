@@ -3,7 +3,7 @@
 use super::*;
 use drivetrain::motor::{AngleDrive, Impedance, ImpedanceControl};
 use drivetrain::odrive::{Firmware, Heartbeat, Mode, Model, Motor};
-use drivetrain::sim::OdriveDrive;
+use drivetrain::sim::{Drive as _, OdriveDrive};
 use drivetrain::units::Angle;
 use std::cell::{Cell, RefCell};
 

@@ -4,7 +4,7 @@ use super::*;
 use drivetrain::control::PidConfig;
 use drivetrain::motor::{AngleDrive, Impedance, ImpedanceControl};
 use drivetrain::rmd::{Mode, Model, Motor};
-use drivetrain::sim::RmdDrive;
+use drivetrain::sim::{Drive as _, RmdDrive};
 use drivetrain::units::Angle;
 use std::cell::{Cell, RefCell};
 

@@ -4,7 +4,7 @@ use super::*;
 use drivetrain::control::PidConfig;
 use drivetrain::motor::{AngleDrive, Impedance, ImpedanceControl};
 use drivetrain::robstride::{Mode, Model, Motor};
-use drivetrain::sim::RobStrideDrive;
+use drivetrain::sim::{Drive as _, RobStrideDrive};
 use drivetrain::units::Angle;
 use embedded_can::ExtendedId;
 use std::cell::{Cell, RefCell};
@@ -22,15 +22,9 @@ struct Joint {
 
 impl Joint {
     fn new(model: Model, mode: impl Into<Mode>, set: Drive) -> Self {
-        let ranges = [model.pmax_rad(), model.vmax_rad_per_s(), model.tmax_nm(), 500.0, 5.0];
-        let drive = if model == Model::CYBERGEAR {
-            RobStrideDrive::cybergear(1)
-        } else {
-            RobStrideDrive::new(1, ranges)
-        };
         Self {
             motor: Own::new(Motor::new(model, 1, mode).unwrap()),
-            drive: RefCell::new(drive),
+            drive: RefCell::new(RobStrideDrive::of(model, 1)),
             answer: Cell::new(None),
             set,
         }

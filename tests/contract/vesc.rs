@@ -3,7 +3,7 @@
 use super::*;
 use drivetrain::encoder::GearRatio;
 use drivetrain::motor::{AngleDrive, Role};
-use drivetrain::sim::{VescDrive, VescMotor};
+use drivetrain::sim::{Drive as _, VescDrive, VescMotor};
 use drivetrain::units::Angle;
 use drivetrain::vesc::{Mode, Model, Motor, Rest};
 use std::cell::{Cell, RefCell};

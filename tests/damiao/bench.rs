@@ -3,10 +3,8 @@
 use drivetrain::damiao::{Mode, Model, Motor};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Devices, ImpedanceControl, Ingest, Own};
-use drivetrain::sim::DamiaoDrive;
+use drivetrain::sim::{DamiaoDrive, Drive};
 use drivetrain::time::{Instant, Tick};
-
-pub(crate) const J4310: [f32; 3] = [12.5, 30.0, 10.0];
 
 /// A motor and its drive on a bus that loses nothing.
 pub(crate) struct Bench {
@@ -23,7 +21,7 @@ pub(crate) struct Bench {
 impl Bench {
     pub(crate) fn new(mode: impl Into<Mode>, number: f32) -> Self {
         let own = Own::new(Motor::new(Model::J4310, 1, mode).unwrap());
-        let drive = DamiaoDrive::new(1, 0x11, J4310).with_register(10, number);
+        let drive = DamiaoDrive::of(Model::J4310, 1).with_register(10, number);
         Self { own, drive, now_us: 1_000, frames: Vec::new(), is_cut: false, passes: |_| true }
     }
 

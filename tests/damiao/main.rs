@@ -12,14 +12,14 @@ mod bench;
 )]
 mod review;
 
-use bench::{Bench, J4310, mit};
+use bench::{Bench, mit};
 use drivetrain::control::PidConfig;
 use drivetrain::damiao::{Mode, Model, Motor, Register};
 use drivetrain::error::ConfigError;
 use drivetrain::motor::{
     AngleDrive, Devices, Impedance, ImpedanceControl, Own, TargetError, VelocityDrive,
 };
-use drivetrain::sim::{DamiaoDrive, DriveShaft};
+use drivetrain::sim::{DamiaoDrive, Drive, DriveShaft};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 
@@ -162,7 +162,8 @@ fn two_motors_with_one_master_id_are_told_apart() {
     let motor =
         |id| Own::new(Motor::new(Model::J4310, id, mode).unwrap().with_master_id(0x10).unwrap());
     let mut robot = [motor(1), motor(2)];
-    let mut drives = [DamiaoDrive::new(1, 0x10, J4310), DamiaoDrive::new(2, 0x10, J4310)];
+    let drive = |id| DamiaoDrive::of(Model::J4310, id).with_register(7, 16.0);
+    let mut drives = [drive(1), drive(2)];
     let mut now = Instant::from_micros(0);
     for ms in 0..1_200_u64 {
         now = Instant::from_micros(1_000 * (ms + 1));

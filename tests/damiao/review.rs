@@ -7,7 +7,7 @@ use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
     AngleDrive, Devices, Impedance, ImpedanceControl, Order, Own, OwnMotor, Target, VelocityDrive,
 };
-use drivetrain::sim::{DamiaoDrive, DriveShaft};
+use drivetrain::sim::{DamiaoDrive, Drive, DriveShaft};
 use drivetrain::time::Tick;
 use drivetrain::time::TimeStep;
 use drivetrain::units::{Angle, AngularVelocity};

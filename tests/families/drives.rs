@@ -3,7 +3,7 @@
 use crate::station::Drive;
 use drivetrain::frame::CanFrame;
 use drivetrain::sim::{
-    DamiaoDrive, DriveShaft, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive,
+    DamiaoDrive, Drive as _, DriveShaft, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive,
 };
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 
@@ -179,7 +179,7 @@ pub(crate) struct Rmd(pub(crate) RmdDrive);
 impl Drive for Rmd {
     usual!();
     fn reports(&mut self) -> Vec<CanFrame> {
-        self.0.report().into_iter().collect()
+        self.0.next_frame().into_iter().collect()
     }
     fn fail(&mut self) {
         self.0.set_reasons(0x0004);

@@ -190,7 +190,7 @@ type Set<M> = crate::station::Set<M>;
 
 fn damiao_in(mode: impl Into<damiao::Mode>, number: f32, set: Set<damiao::Motor>) -> Station {
     let motor = damiao::Motor::new(damiao::Model::J4310, 1, mode).unwrap();
-    let drive = DamiaoDrive::new(1, 0x11, [12.5, 30.0, 10.0]).with_register(10, number);
+    let drive = DamiaoDrive::of(damiao::Model::J4310, 1).with_register(10, number);
     Station::new(motor, set, Damiao(drive, number < 2.0))
 }
 
@@ -199,12 +199,8 @@ fn robstride_in(
     mode: impl Into<robstride::Mode>,
     set: Set<robstride::Motor>,
 ) -> Station {
-    let drive = if model == robstride::Model::CYBERGEAR {
-        RobStrideDrive::cybergear(1)
-    } else {
-        RobStrideDrive::new(1, [12.57, 44.0, 17.0, 500.0, 5.0])
-    };
-    Station::new(robstride::Motor::new(model, 1, mode).unwrap(), set, RobStride(drive))
+    let drive = RobStride(RobStrideDrive::of(model, 1));
+    Station::new(robstride::Motor::new(model, 1, mode).unwrap(), set, drive)
 }
 
 fn vesc_in(mode: vesc::Mode, set: Set<vesc::Motor>) -> Station {
@@ -221,8 +217,8 @@ fn vesc_in(mode: vesc::Mode, set: Set<vesc::Motor>) -> Station {
 
 fn lk_in(mode: impl Into<lk::Mode>, set: Set<lk::Motor>) -> Station {
     let model = lk::Model::MF9025_16T;
-    let drive = LkDrive::new(1, 33.0 / 4096.0, model.torque_constant(), 1.0, model.encoder_bits());
-    Station::new(lk::Motor::new(model, 1, mode).unwrap(), set, Lk(drive))
+    let drive = Lk(LkDrive::of(model, 1));
+    Station::new(lk::Motor::new(model, 1, mode).unwrap(), set, drive)
 }
 
 fn rmd_in(mode: impl Into<rmd::Mode>, set: Set<rmd::Motor>) -> Station {

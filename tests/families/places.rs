@@ -6,7 +6,7 @@ use drivetrain::damiao::{Mode, Model, Motor};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Devices, Own, VelocityDrive};
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::sim::{Controller, DamiaoDrive, DriveShaft, Line, Sender, Simulation};
+use drivetrain::sim::{Controller, DamiaoDrive, Drive, DriveShaft, Line, Sender, Simulation};
 use drivetrain::time::Duration;
 use drivetrain::units::AngularVelocity;
 use embedded_can::{Frame, Id, StandardId};
@@ -40,12 +40,11 @@ impl<'w> embedded_can::nb::Can for Driver<'w> {
 /// Drives `N` joints for a second, polled every `poll_us`. Returns the fewest commands in a second that reached a drive.
 fn fewest_commands<const N: usize>(only_refuses: bool, period_us: u32, poll_us: u32) -> usize {
     let (world, model) = (Simulation::new(1), Model::J4310);
-    let ranges = [model.pmax_rad(), model.vmax_rad_per_s(), model.tmax_nm()];
     let mode = || Mode::velocity(AngularVelocity::from_rpm(100.0));
     let joints: [_; N] =
         core::array::from_fn(|index| Own::new(Motor::new(model, index as u8 + 1, mode()).unwrap()));
     let mut drives: [_; N] = core::array::from_fn(|index| {
-        let drive = DamiaoDrive::new(index as u8 + 1, 0x11 + index as u16, ranges);
+        let drive = DamiaoDrive::of(model, index as u8 + 1);
         drive.with_register(10, 3.0).with_shaft(DriveShaft::new(0.02, 0.02))
     });
     let period = Duration::from_micros(period_us.into());

@@ -31,7 +31,7 @@ fn f85_a_drive_that_forgets_its_run_mode_gets_it_before_arming_and_is_refused_if
         assert_eq!(bench.drive.parameter(0x7005), Some(0.0));
     }
     let mut old = robstride::Bench::new(Mode::position(slow, 8.0));
-    old.drive = RobStrideDrive::cybergear(1);
+    old.drive = RobStrideDrive::of(Model::CYBERGEAR, 1);
     old.steps(300, |_| {});
     let refused = old.own.arm(old.now()).unwrap_err();
     assert!(matches!(refused, ArmError::Setting(_)), "{refused}");

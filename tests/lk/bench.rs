@@ -3,7 +3,7 @@
 use drivetrain::frame::CanFrame;
 use drivetrain::lk::{Mode, Model, Motor};
 use drivetrain::motor::{Devices, ImpedanceControl, Ingest, Own};
-use drivetrain::sim::LkDrive;
+use drivetrain::sim::{Drive, LkDrive};
 use drivetrain::time::{Instant, Tick};
 
 /// A motor and its drive on a bus that loses nothing.
@@ -62,8 +62,7 @@ impl Bench {
 }
 
 pub(crate) fn drive_of(model: &Model) -> LkDrive {
-    let amperes = model.series().amperes_per_count();
-    LkDrive::new(1, amperes, model.torque_constant(), model.gear(), model.encoder_bits())
+    LkDrive::of(*model, 1)
 }
 
 pub(crate) fn torque() -> ImpedanceControl {

@@ -14,7 +14,7 @@ use drivetrain::motor::{
     AngleDrive, Condition, Devices, Impedance, ImpedanceControl, Ingest, Link, Own, OwnMotor,
     VelocityDrive,
 };
-use drivetrain::sim::DriveShaft;
+use drivetrain::sim::{Drive, DriveShaft};
 use drivetrain::time::{Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use std::f32::consts::TAU;
@@ -487,9 +487,7 @@ fn a_motor_that_is_updated_250_times_a_second_is_never_late() {
 fn two_motors_on_a_bus_hear_their_own_drives_alone() {
     let motor = |id| Own::new(Motor::new(Model::MF9025_16T, id, torque()).unwrap());
     let mut robot = [motor(1), motor(2)];
-    let amperes = Series::Mf.amperes_per_count();
-    let drive = |id| drivetrain::sim::LkDrive::new(id, amperes, 0.32, 1.0, 16);
-    let mut drives = [drive(1), drive(2)];
+    let mut drives = [1, 2].map(|id| drivetrain::sim::LkDrive::of(Model::MF9025_16T, id));
     for ms in 0..1_200_u64 {
         let now = Instant::from_micros(1_000 * (ms + 1));
         robot.update(Tick::new(now, 0.001));

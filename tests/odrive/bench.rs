@@ -3,7 +3,7 @@
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Devices, ImpedanceControl, Ingest, Own};
 use drivetrain::odrive::{Firmware, Mode, Model, Motor};
-use drivetrain::sim::OdriveDrive;
+use drivetrain::sim::{Drive, OdriveDrive};
 use drivetrain::time::{Instant, Tick};
 use drivetrain::units::AngularVelocity;
 

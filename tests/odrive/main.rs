@@ -15,7 +15,7 @@ use drivetrain::motor::{
     AngleDrive, Condition, Devices, Ingest, Malformed, Own, OwnMotor, VelocityDrive,
 };
 use drivetrain::odrive::{Endpoints, Feedback, Firmware, Heartbeat, Mode, Model, Motor};
-use drivetrain::sim::{DriveShaft, OdriveDrive};
+use drivetrain::sim::{Drive, DriveShaft, OdriveDrive};
 use drivetrain::time::{Duration, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use embedded_can::{Frame, StandardId};

@@ -4,6 +4,7 @@ use crate::bench::{Bench, torque};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{AngleDrive, Devices, VelocityDrive};
 use drivetrain::odrive::{Firmware, Heartbeat, Mode};
+use drivetrain::sim::Drive;
 use drivetrain::time::Tick;
 use drivetrain::units::{Angle, AngularVelocity};
 

@@ -3,7 +3,7 @@
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Devices, ImpedanceControl, Ingest, Own};
 use drivetrain::rmd::{Mode, Model, Motor};
-use drivetrain::sim::RmdDrive;
+use drivetrain::sim::{Drive, RmdDrive};
 use drivetrain::time::{Instant, Tick};
 
 /// A motor and its drive on a bus that loses nothing.
@@ -51,7 +51,7 @@ impl Bench {
         for _ in 0..10 {
             self.drive.step(1e-4);
         }
-        if let Some(report) = self.drive.report().filter(|_| !self.is_cut) {
+        if let Some(report) = self.drive.next_frame().filter(|_| !self.is_cut) {
             assert_eq!(Devices::ingest(&mut self.own, &report, now), Ingest::Taken);
         }
     }

@@ -15,6 +15,7 @@ use drivetrain::motor::{
     OwnMotor, Timeouts, VelocityDrive,
 };
 use drivetrain::rmd::{Mode, Model, Motor};
+use drivetrain::sim::Drive;
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use embedded_can::Frame;
@@ -341,7 +342,7 @@ fn a_drive_that_timed_out_unnoticed_trips_the_motor() {
             bench.own.update(Tick::new(now, 0.001));
             while bench.own.next_frame(0).is_some() {}
             bench.drive.step(0.001);
-            if let Some(report) = bench.drive.report().filter(|_| has_report) {
+            if let Some(report) = bench.drive.next_frame().filter(|_| has_report) {
                 assert_eq!(Devices::ingest(&mut bench.own, &report, now), Ingest::Taken);
             }
         }

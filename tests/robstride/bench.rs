@@ -3,7 +3,7 @@
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Devices, ImpedanceControl, Ingest, Own};
 use drivetrain::robstride::{Mode, Model, Motor};
-use drivetrain::sim::RobStrideDrive;
+use drivetrain::sim::{Drive, RobStrideDrive};
 use drivetrain::time::{Instant, Tick};
 
 /// A motor and its drive on a bus that loses nothing unless told.
@@ -29,17 +29,9 @@ impl Bench {
 
     pub(crate) fn of(model: Model, mode: impl Into<Mode>) -> Self {
         let own = Own::new(Motor::new(model, 1, mode).unwrap());
-        let (kp, kd) = model.ranges().gains();
-        let ranges = [model.pmax_rad(), model.vmax_rad_per_s(), model.tmax_nm(), kp, kd];
-        let is_cybergear = model.name() == "CyberGear";
-        let drive = if is_cybergear {
-            RobStrideDrive::cybergear(1)
-        } else {
-            RobStrideDrive::new(1, ranges)
-        };
         Self {
             own,
-            drive,
+            drive: RobStrideDrive::of(model, 1),
             now_us: 1_000,
             frames: Vec::new(),
             passes: |_| true,

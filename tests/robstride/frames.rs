@@ -4,6 +4,7 @@ use crate::bench::{Bench, operation};
 use crate::extended;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Devices, Ingest, Malformed};
+use drivetrain::sim::Drive;
 use embedded_can::{ExtendedId, Frame, StandardId};
 
 const FEEDBACK: u32 = 0x0280_01FD;

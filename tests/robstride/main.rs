@@ -17,7 +17,7 @@ use drivetrain::motor::{
     TargetError, VelocityDrive,
 };
 use drivetrain::robstride::{Mode, Model, Motor, Register, Status};
-use drivetrain::sim::{DriveShaft, RobStrideDrive};
+use drivetrain::sim::{Drive, DriveShaft, RobStrideDrive};
 use drivetrain::time::{Duration, Edge, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 
@@ -125,7 +125,7 @@ fn the_run_mode_is_read_and_set_before_a_motor_is_armed() {
 #[test]
 fn a_drive_that_does_not_take_the_run_mode_is_not_armed_and_the_parameter_is_named() {
     let mut bench = Bench::new(Mode::position(rad_per_s(10.0), 8.0));
-    bench.drive = RobStrideDrive::cybergear(1);
+    bench.drive = RobStrideDrive::of(Model::CYBERGEAR, 1);
     bench.steps(400, |bench| assert!(!bench.drive.is_enabled()));
     let refused = bench.own.arm(bench.now()).unwrap_err();
     assert!(matches!(refused, ArmError::Setting(_)));
@@ -229,7 +229,7 @@ fn the_drive_itself_gets_the_torque_limit_of_the_operation_mode() {
 #[test]
 fn a_robstride_without_a_time_out_is_not_armed() {
     let mut bench = Bench::new(operation());
-    bench.drive = RobStrideDrive::cybergear(1);
+    bench.drive = RobStrideDrive::of(Model::CYBERGEAR, 1);
     bench.steps(400, |_| {});
     let refused = bench.own.arm(bench.now()).unwrap_err().to_string();
     assert!(
@@ -412,9 +412,8 @@ fn the_zero_and_the_id_are_set_while_the_motor_is_disarmed_only() {
 #[test]
 fn two_motors_on_one_bus_are_told_apart() {
     let motor = |id| Own::new(Motor::new(Model::RS02, id, operation()).unwrap());
-    let ranges = [4.0 * core::f32::consts::PI, 44.0, 17.0, 500.0, 5.0];
     let mut robot = [motor(1), motor(2)];
-    let mut drives = [1, 2].map(|id| RobStrideDrive::new(id, ranges));
+    let mut drives = [1, 2].map(|id| RobStrideDrive::of(Model::RS02, id));
     let mut now = Instant::from_micros(0);
     for ms in 0..1_200_u64 {
         now = Instant::from_micros(1_000 * (ms + 1));

@@ -2,7 +2,8 @@
 
 use super::BUS;
 use drivetrain::frame::CanFrame;
-use drivetrain::sim::{DamiaoDrive, DriveShaft, RobStrideDrive};
+use drivetrain::sim::{self, DamiaoDrive, DriveShaft, RobStrideDrive};
+use drivetrain::{damiao, robstride};
 use socketcan::{CanSocket, Socket};
 use std::process::{Command, Stdio};
 use std::time::Instant;
@@ -10,10 +11,8 @@ use std::time::Instant;
 /// 2 rad/s by 0.5 Nm s/rad against the friction of 0.01 Nm s/rad.
 const SPEED: f32 = 2.0 * 0.5 / 0.51;
 
-/// A drive on the bus: how it hears, how it moves, its shaft, and whether it is enabled.
-trait Drive {
-    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame>;
-    fn step(&mut self, dt_s: f32);
+/// A drive on the bus: its shaft, and whether it is enabled.
+trait Drive: sim::Drive {
     fn shaft(&self) -> &DriveShaft;
     fn is_enabled(&self) -> bool;
 }
@@ -21,8 +20,6 @@ trait Drive {
 macro_rules! drive {
     ($($drive:ident)+) => { $(
         impl Drive for $drive {
-            fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> { Self::hear(self, frame) }
-            fn step(&mut self, dt_s: f32) { Self::step(self, dt_s) }
             fn shaft(&self) -> &DriveShaft { Self::shaft(self) }
             fn is_enabled(&self) -> bool { Self::is_enabled(self) }
         }
@@ -73,7 +70,7 @@ fn is_as_driven(said: &[Vec<String>], fastest: f32) {
 #[test]
 #[ignore = "needs vcan0: tests/vcan/run starts a Linux that has it"]
 fn a_foreign_master_drives_the_simulated_damiao_and_sees_its_time_out() {
-    let mut drive = DamiaoDrive::new(1, 0x11, [12.5, 30.0, 10.0]);
+    let mut drive = DamiaoDrive::of(damiao::Model::J4310, 1);
     let (said, fastest) = driven(&mut drive, "damiao");
     is_as_driven(&said, fastest);
     assert_eq!(said[1][1], "1", "enabled");
@@ -85,7 +82,7 @@ fn a_foreign_master_drives_the_simulated_damiao_and_sees_its_time_out() {
 #[test]
 #[ignore = "needs vcan0: tests/vcan/run starts a Linux that has it"]
 fn a_foreign_master_drives_the_simulated_robstride_until_its_time_out() {
-    let mut drive = RobStrideDrive::new(1, [4.0 * std::f32::consts::PI, 44.0, 17.0, 500.0, 5.0]);
+    let mut drive = RobStrideDrive::of(robstride::Model::RS02, 1);
     let (said, fastest) = driven(&mut drive, "robstride");
     is_as_driven(&said, fastest);
     assert_eq!(said[2][0], "silent", "{said:?}");

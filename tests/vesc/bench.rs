@@ -4,7 +4,7 @@ use drivetrain::control::PidConfig;
 use drivetrain::encoder::GearRatio;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Devices, Ingest, Own};
-use drivetrain::sim::{VescDrive, VescMotor};
+use drivetrain::sim::{Drive, VescDrive, VescMotor};
 use drivetrain::time::{Instant, Tick};
 use drivetrain::units::AngularVelocity;
 use drivetrain::vesc::{Mode, Model, Motor};

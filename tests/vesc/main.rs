@@ -13,6 +13,7 @@ use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
     AngleDrive, Condition, Devices, Ingest, Own, TargetError, Timeouts, VelocityDrive,
 };
+use drivetrain::sim::Drive;
 use drivetrain::sim::DriveShaft;
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};

@@ -5,7 +5,7 @@ use drivetrain::dji::Bus;
 use drivetrain::encoder::Position;
 use drivetrain::motor::{AngleDrive, ImpedanceControl, Own};
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::sim::{DamiaoDrive, DriveShaft, Line, MotorConfig, Sender, Simulation};
+use drivetrain::sim::{DamiaoDrive, DriveShaft, Line, MotorConfig, Simulation};
 use drivetrain::time::Duration;
 use drivetrain::units::Angle;
 
@@ -15,8 +15,7 @@ fn a_damiao_joint_tilts_beside_the_yaw_motor() {
     let motor = MotorConfig::gm6020_voltage(1).with_line(Line::Can2).with_rotor_angle(4_096);
     let key = world.attach(motor.with_load_inertia_kg_m2(0.005)).unwrap();
     // The drive on the other end of the wire: id 1, answers with 0x11, its ranges as delivered.
-    let mut drive =
-        DamiaoDrive::new(1, 0x11, [12.5, 30.0, 10.0]).with_shaft(DriveShaft::new(0.02, 0.02));
+    let mut drive = DamiaoDrive::of(Model::J4310, 1).with_shaft(DriveShaft::new(0.02, 0.02));
 
     let mut bus = Bus::<Upper>::branded();
     let yaw = bus.attach(yaw()).unwrap();
@@ -26,14 +25,8 @@ fn a_damiao_joint_tilts_beside_the_yaw_motor() {
     let controller = Nb(world.controller_on(Line::Can2));
     let mut runner = Runner::new(controller, world.clock(), (bus, pitch));
     for ms in 0..2_000 {
-        let mut answers = Vec::new();
-        world.advance_with(Duration::from_millis(1), |record| {
-            if record.sender == Sender::Controller {
-                answers.extend(drive.hear(&record.frame));
-            }
-        });
-        answers.into_iter().for_each(|answer| world.inject(Line::Can2, answer).unwrap());
-        (0..4).for_each(|_| drive.step(0.000_25));
+        let tick = Duration::from_millis(1);
+        world.advance_drives(tick, &mut [(Line::Can2, &mut drive)]).unwrap();
         runner.poll(16);
         let Some(tick) = runner.due() else { continue };
         if ms == 300 {

@@ -10,9 +10,7 @@ use drivetrain::control::PidConfig;
 use drivetrain::encoder::GearRatio;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Devices, ImpedanceControl, Ingest, Own, OwnMotor, VelocityDrive};
-use drivetrain::sim::{
-    DriveShaft, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive, VescMotor,
-};
+use drivetrain::sim::{self, DriveShaft, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive, VescMotor};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::AngularVelocity;
 use drivetrain::{lk, odrive, rmd, robstride, vesc};
@@ -22,58 +20,42 @@ const SPEED: AngularVelocity = AngularVelocity::from_rad_per_s(1.0);
 const SPEED_LOOP: PidConfig = PidConfig::new(0.8, 4.0, 0.001);
 
 /// A simulated drive.
-trait Drive {
-    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame>;
-    fn step(&mut self, dt_s: f32);
+trait Drive: sim::Drive {
     fn shaft(&self) -> &DriveShaft;
-    /// Returns a frame that the drive sends by itself, the last of a cycle being its feedback.
-    fn report(&mut self) -> Option<CanFrame> {
-        None
-    }
     /// Tells whether a frame is the feedback of the shaft.
     fn is_feedback(frame: &CanFrame) -> bool;
 }
 
-/// The methods that the drives have by themselves.
-macro_rules! forward {
-    () => {
-        fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
-            Self::hear(self, frame)
-        }
-        fn step(&mut self, dt_s: f32) {
-            Self::step(self, dt_s);
-        }
-        fn shaft(&self) -> &DriveShaft {
-            Self::shaft(self)
-        }
-    };
-}
-
 impl Drive for LkDrive {
-    forward!();
+    fn shaft(&self) -> &DriveShaft {
+        self.shaft()
+    }
     fn is_feedback(frame: &CanFrame) -> bool {
         frame.bytes()[0] == 0xA1
     }
 }
 
 impl Drive for RmdDrive {
-    forward!();
+    fn shaft(&self) -> &DriveShaft {
+        self.shaft()
+    }
     fn is_feedback(frame: &CanFrame) -> bool {
         frame.bytes()[0] == 0xA1
     }
 }
 
 impl Drive for RobStrideDrive {
-    forward!();
+    fn shaft(&self) -> &DriveShaft {
+        self.shaft()
+    }
     fn is_feedback(frame: &CanFrame) -> bool {
         frame.header() >> 24 & 0x1F == 2
     }
 }
 
 impl Drive for OdriveDrive {
-    forward!();
-    fn report(&mut self) -> Option<CanFrame> {
-        self.next_frame()
+    fn shaft(&self) -> &DriveShaft {
+        self.shaft()
     }
     fn is_feedback(frame: &CanFrame) -> bool {
         frame.header() & 0x1F == 0x09
@@ -83,7 +65,7 @@ impl Drive for OdriveDrive {
 /// A VESC and whether it has reported in this cycle.
 struct Vesc(VescDrive, bool);
 
-impl Drive for Vesc {
+impl sim::Drive for Vesc {
     fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
         self.0.hear(frame)
     }
@@ -91,12 +73,15 @@ impl Drive for Vesc {
         self.0.step(dt_s);
         self.1 = false;
     }
-    fn shaft(&self) -> &DriveShaft {
-        self.0.shaft()
-    }
-    fn report(&mut self) -> Option<CanFrame> {
+    fn next_frame(&mut self) -> Option<CanFrame> {
         let is_due = !core::mem::replace(&mut self.1, true);
         self.0.report(9).filter(|_| is_due)
+    }
+}
+
+impl Drive for Vesc {
+    fn shaft(&self) -> &DriveShaft {
+        self.0.shaft()
     }
     fn is_feedback(frame: &CanFrame) -> bool {
         frame.header() >> 8 & 0xFF == 9
@@ -145,7 +130,7 @@ impl<M: OwnMotor + Debug, D: Drive> Group<M, D> {
         }
         for index in 0..MOTORS {
             self.drives[index].step(0.001);
-            while let Some(frame) = self.drives[index].report() {
+            while let Some(frame) = self.drives[index].next_frame() {
                 self.take(index, Some(frame));
             }
         }
@@ -225,10 +210,9 @@ fn torque() -> ImpedanceControl {
 
 pub fn rows() {
     let model = lk::Model::MF9025_16T;
-    let amperes = model.series().amperes_per_count();
     measure(["lk_tick", "lk_ingest", "constant_ingest_lk"], |ids, start| {
         let motors = ids.map(|id| lk::Motor::new(model, id, torque()).unwrap());
-        let drives = ids.map(|id| LkDrive::new(id, amperes, model.torque_constant(), 1.0, 16));
+        let drives = ids.map(|id| LkDrive::of(model, id));
         Group::new(motors, drives, start)
     });
 
@@ -240,10 +224,9 @@ pub fn rows() {
     });
 
     let model = robstride::Model::RS02;
-    let ranges = [model.pmax_rad(), model.vmax_rad_per_s(), model.tmax_nm(), 500.0, 5.0];
     measure(["robstride_tick", "robstride_ingest", "constant_ingest_robstride"], |ids, start| {
         let motors = ids.map(|id| robstride::Motor::new(model, id, torque()).unwrap());
-        let drives = ids.map(|id| RobStrideDrive::new(id, ranges));
+        let drives = ids.map(|id| RobStrideDrive::of(model, id));
         Group::new(motors, drives, start)
     });
 

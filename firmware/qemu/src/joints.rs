@@ -9,7 +9,7 @@ use drivetrain::control::{Pid, PidConfig};
 use drivetrain::damiao::{Model, Motor};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Devices, ImpedanceControl, Ingest, Own, VelocityDrive};
-use drivetrain::sim::DamiaoDrive;
+use drivetrain::sim::{DamiaoDrive, Drive};
 use drivetrain::time::{Duration, Instant, Tick, TimeStep};
 use drivetrain::units::AngularVelocity;
 use drivetrain::wire::mit::{self, Ranges};
@@ -38,7 +38,9 @@ impl Arm {
             let motor = Motor::new(Model::J4310, black_box(id), mode).unwrap();
             Own::new(motor.with_master_id(master_id(id)).unwrap()).with_opening(Duration::ZERO)
         });
-        let drives = ids.map(|id| DamiaoDrive::new(id, master_id(id), [12.5, 30.0, 10.0]));
+        let drives = ids.map(|id| {
+            DamiaoDrive::of(Model::J4310, id).with_register(7, f32::from(master_id(id)))
+        });
         let mut arm = Self { joints, drives, answers: [None; MOTORS], now };
         for cycle in 0..300 {
             arm.cycle();

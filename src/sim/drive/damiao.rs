@@ -6,7 +6,8 @@
     reason = "fields of a frame and of its registers, which saturate"
 )]
 
-use super::{DriveShaft, float, within};
+use super::{Drive, DriveShaft, float, within};
+use crate::damiao::Model;
 use crate::frame::CanFrame;
 use embedded_can::{Frame, Id, StandardId};
 
@@ -28,17 +29,17 @@ const TMAX: usize = 6;
 
 /// A Damiao drive with its shaft, for tests: takes frames, answers them, and moves.
 ///
-/// The drive is not a part of the [`Simulation`](crate::sim::Simulation): pass each frame of the
-/// [`Controller`](crate::sim::Sender::Controller) to [`hear`](Self::hear), and put the answer on the bus. Enabling, errors, the four
-/// control modes, registers and the time-out are as in the manual. A frame to the id of another control mode is discarded without an
-/// answer. The shaft is an inertia with viscous friction.
+/// [`Simulation::advance_drives`](crate::sim::Simulation::advance_drives) puts the drive on a bus. Enabling, errors, the four control
+/// modes, registers and the time-out are as in the manual. A frame to the id of another control mode is discarded without an answer. The
+/// shaft is an inertia with viscous friction.
 ///
 /// # Examples
 /// ```
+/// use drivetrain::damiao::Model;
 /// use drivetrain::frame::CanFrame;
-/// use drivetrain::sim::DamiaoDrive;
+/// use drivetrain::sim::{DamiaoDrive, Drive};
 ///
-/// let mut drive = DamiaoDrive::new(1, 0x11, [12.5, 30.0, 10.0]); // PMAX, VMAX, TMAX of a DM-J4310
+/// let mut drive = DamiaoDrive::of(Model::J4310, 1);
 /// let enable = [0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFC];
 /// let answer = CanFrame::standard(1, enable).and_then(|frame| drive.hear(&frame)).ok_or("no answer")?;
 /// assert_eq!((answer.header(), answer.bytes()[0]), (0x11, 0x11)); // enabled, id 1
@@ -73,11 +74,14 @@ enum Command {
 }
 
 impl DamiaoDrive {
-    /// Makes a drive with a command id, 1 to 15, a feedback id, and the registers PMAX in rad, VMAX in rad/s and TMAX in Nm. The drive is
-    /// in MIT mode, without a time-out, with an inertia of 0.01 kg m².
+    /// Makes a drive of a model with a command id, 1 to 15. The feedback id is the command id plus 16, and the registers PMAX, VMAX and TMAX
+    /// have the values of the model; [`with_register`](Self::with_register) sets others. The drive is in MIT mode, without a time-out, with
+    /// an inertia of 0.01 kg m².
     #[must_use]
-    pub fn new(id: u8, master_id: u16, [pmax, vmax, tmax]: [f32; 3]) -> Self {
-        let values = [master_id.into(), id.into(), 0.0, 1.0, pmax.into(), vmax.into(), tmax.into()];
+    pub fn of(model: Model, id: u8) -> Self {
+        let [pmax, vmax, tmax] = [model.pmax_rad(), model.vmax_rad_per_s(), model.tmax_nm()];
+        let master_id = 16.0 + f64::from(id);
+        let values = [master_id, id.into(), 0.0, 1.0, pmax.into(), vmax.into(), tmax.into()];
         Self {
             id,
             values,
@@ -137,40 +141,6 @@ impl DamiaoDrive {
     #[must_use]
     pub const fn error(&self) -> u8 {
         self.error
-    }
-
-    /// Takes a frame from the bus and returns the answer. Returns `None` if the frame is not for this drive.
-    pub fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
-        let id = standard(frame)?;
-        if id == 0x7FF {
-            return self.hear_inquiry(frame.bytes());
-        }
-        let mode = (self.value(MODE) as u16).saturating_sub(1);
-        let own = u16::from(self.id);
-        let bits = u64::from_be_bytes(*frame.bytes());
-        let is_for_mode = id == own + (mode << 8);
-        match bits {
-            ENABLE | DISABLE | SET_ZERO | CLEAR_ERROR if is_for_mode || id == own => {
-                self.switch(bits);
-            }
-            _ if is_for_mode => self.command = self.read(mode, frame.bytes()),
-            _ => return None,
-        }
-        self.silence_s = 0.0;
-        Some(self.feedback())
-    }
-
-    /// Advances by a time in s.
-    pub fn step(&mut self, dt_s: f32) {
-        let dt_s = f64::from(dt_s);
-        self.silence_s += dt_s;
-        let timeout_s = self.value(TIMEOUT) * 50e-6;
-        if self.is_enabled && timeout_s > 0.0 && self.silence_s > timeout_s {
-            self.fail(COMMUNICATION_LOST);
-        }
-        let most = self.value(TMAX);
-        let wanted = if self.is_enabled { self.wanted_nm() } else { 0.0 };
-        self.shaft.step(within(wanted, most), dt_s);
     }
 
     fn wanted_nm(&self) -> f64 {
@@ -284,6 +254,40 @@ impl DamiaoDrive {
                 *place = value;
             }
         }
+    }
+}
+
+impl Drive for DamiaoDrive {
+    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
+        let id = standard(frame)?;
+        if id == 0x7FF {
+            return self.hear_inquiry(frame.bytes());
+        }
+        let mode = (self.value(MODE) as u16).saturating_sub(1);
+        let own = u16::from(self.id);
+        let bits = u64::from_be_bytes(*frame.bytes());
+        let is_for_mode = id == own + (mode << 8);
+        match bits {
+            ENABLE | DISABLE | SET_ZERO | CLEAR_ERROR if is_for_mode || id == own => {
+                self.switch(bits);
+            }
+            _ if is_for_mode => self.command = self.read(mode, frame.bytes()),
+            _ => return None,
+        }
+        self.silence_s = 0.0;
+        Some(self.feedback())
+    }
+
+    fn step(&mut self, dt_s: f32) {
+        let dt_s = f64::from(dt_s);
+        self.silence_s += dt_s;
+        let timeout_s = self.value(TIMEOUT) * 50e-6;
+        if self.is_enabled && timeout_s > 0.0 && self.silence_s > timeout_s {
+            self.fail(COMMUNICATION_LOST);
+        }
+        let most = self.value(TMAX);
+        let wanted = if self.is_enabled { self.wanted_nm() } else { 0.0 };
+        self.shaft.step(within(wanted, most), dt_s);
     }
 }
 

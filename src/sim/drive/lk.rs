@@ -7,8 +7,9 @@
     reason = "fields of a frame, which wrap as the drive's do"
 )]
 
-use super::{DriveShaft, within};
+use super::{Drive, DriveShaft, within};
 use crate::frame::CanFrame;
+use crate::lk::Model;
 use embedded_can::{Frame, Id, StandardId};
 
 const OFF: u64 = 0x80;
@@ -24,14 +25,16 @@ const POSITION: u64 = 0xA4;
 /// An LK-TECH drive with its shaft, for tests: takes frames, answers them, and moves.
 ///
 /// The drive is on as soon as its supply is, and follows its last command for ever. "Off" clears the counted turns and the command; the
-/// drive still answers. With an error the torque is zero. Frames of the manual that the family does not send are not answered.
+/// drive still answers. With an error the torque is zero. Frames of the manual that the family does not send are not answered. Commands and
+/// answers have one id: a drive that hears its own answer answers again.
 ///
 /// # Examples
 /// ```
 /// use drivetrain::frame::CanFrame;
-/// use drivetrain::sim::LkDrive;
+/// use drivetrain::lk::Model;
+/// use drivetrain::sim::{Drive, LkDrive};
 ///
-/// let mut drive = LkDrive::new(1, 33.0 / 4096.0, 0.32, 1.0, 16); // A a count, Nm/A, gear, bits of the encoder
+/// let mut drive = LkDrive::of(Model::MF9025_16T, 1); // 33/4096 A a count, 0.32 Nm/A
 /// let torque = [0xA1, 0, 0, 0, 100, 0, 0, 0];
 /// let answer = CanFrame::standard(0x141, torque).and_then(|frame| drive.hear(&frame)).ok_or("no answer")?;
 /// assert_eq!((answer.header(), answer.bytes()[0]), (0x141, 0xA1));
@@ -68,21 +71,15 @@ enum Command {
 }
 
 impl LkDrive {
-    /// Makes a drive with an id, 1 to 32, the current of a count in A, the torque constant in Nm/A at the output shaft, the gear ratio
-    /// (turns of the rotor per turn of the output shaft), and the bits of the encoder. The drive is on, with an inertia of 0.01 kg m².
+    /// Makes a drive of a model with an id, 1 to 32. The drive is on, with an inertia of 0.01 kg m².
     #[must_use]
-    pub fn new(
-        id: u8,
-        amperes_per_count: f32,
-        torque_constant: f32,
-        gear: f32,
-        encoder_bits: u8,
-    ) -> Self {
+    pub fn of(model: Model, id: u8) -> Self {
+        let amperes_per_count = f64::from(model.series().amperes_per_count());
         Self {
             id,
-            torque_per_count: f64::from(amperes_per_count) * f64::from(torque_constant),
-            gear: gear.into(),
-            encoder_bits,
+            torque_per_count: amperes_per_count * f64::from(model.torque_constant()),
+            gear: model.gear().into(),
+            encoder_bits: model.encoder_bits(),
             is_on: true,
             errors: 0,
             reasons: 0,
@@ -144,8 +141,46 @@ impl LkDrive {
         self.errors
     }
 
-    /// Takes a frame from the bus and returns the answer. Returns `None` if the frame is not for this drive.
-    pub fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
+    fn wanted_nm(&self) -> f64 {
+        let to_shaft = core::f64::consts::PI / 180.0 / self.gear;
+        match self.command {
+            Command::None => 0.0,
+            Command::Torque(counts) => counts * self.torque_per_count,
+            Command::Velocity(velocity, limit) => {
+                let most = if limit > 0.0 { limit * self.torque_per_count } else { f64::MAX };
+                within(self.shaft.following_nm(velocity * to_shaft), most)
+            }
+            Command::Position(angle, limit) => {
+                let way = angle - (self.rotor_turns() - self.cleared) * 360.0;
+                self.shaft.following_nm(within(5.0 * way, limit) * to_shaft)
+            }
+        }
+    }
+
+    /// Returns bytes 1 to 7 of a feedback frame.
+    fn feedback(&self) -> u64 {
+        let current = (self.shaft.torque_nm / self.torque_per_count) as i16;
+        let velocity = (self.shaft.velocity_rad_per_s * self.gear).to_degrees() as i16;
+        let turns = self.rotor_turns();
+        let counts = (turns - floor(turns)) * f64::from(1_u32 << self.encoder_bits);
+        u64::from(self.temperature_c as u8) << 8
+            | u64::from(current as u16) << 16
+            | u64::from(velocity as u16) << 32
+            | (counts as u64 & 0xFFFF) << 48
+    }
+
+    fn rotor_turns(&self) -> f64 {
+        self.shaft.angle_rad * self.gear / core::f64::consts::TAU
+    }
+
+    /// Clears the whole turns; the angle within the turn stays.
+    fn clear_turns(&mut self) {
+        self.cleared = floor(self.rotor_turns());
+    }
+}
+
+impl Drive for LkDrive {
+    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
         let id = StandardId::new(0x140 + u16::from(self.id))?;
         if frame.id() != Id::Standard(id) || !frame.is_data_frame() || frame.length() != 8 {
             return None;
@@ -191,47 +226,9 @@ impl LkDrive {
         Some(CanFrame::of(Id::Standard(id), answer.to_le_bytes()))
     }
 
-    /// Advances by a time in s.
-    pub fn step(&mut self, dt_s: f32) {
+    fn step(&mut self, dt_s: f32) {
         let torque_nm = if self.is_on && self.errors == 0 { self.wanted_nm() } else { 0.0 };
         self.shaft.step(torque_nm, dt_s.into());
-    }
-
-    fn wanted_nm(&self) -> f64 {
-        let to_shaft = core::f64::consts::PI / 180.0 / self.gear;
-        match self.command {
-            Command::None => 0.0,
-            Command::Torque(counts) => counts * self.torque_per_count,
-            Command::Velocity(velocity, limit) => {
-                let most = if limit > 0.0 { limit * self.torque_per_count } else { f64::MAX };
-                within(self.shaft.following_nm(velocity * to_shaft), most)
-            }
-            Command::Position(angle, limit) => {
-                let way = angle - (self.rotor_turns() - self.cleared) * 360.0;
-                self.shaft.following_nm(within(5.0 * way, limit) * to_shaft)
-            }
-        }
-    }
-
-    /// Returns bytes 1 to 7 of a feedback frame.
-    fn feedback(&self) -> u64 {
-        let current = (self.shaft.torque_nm / self.torque_per_count) as i16;
-        let velocity = (self.shaft.velocity_rad_per_s * self.gear).to_degrees() as i16;
-        let turns = self.rotor_turns();
-        let counts = (turns - floor(turns)) * f64::from(1_u32 << self.encoder_bits);
-        u64::from(self.temperature_c as u8) << 8
-            | u64::from(current as u16) << 16
-            | u64::from(velocity as u16) << 32
-            | (counts as u64 & 0xFFFF) << 48
-    }
-
-    fn rotor_turns(&self) -> f64 {
-        self.shaft.angle_rad * self.gear / core::f64::consts::TAU
-    }
-
-    /// Clears the whole turns; the angle within the turn stays.
-    fn clear_turns(&mut self) {
-        self.cleared = floor(self.rotor_turns());
     }
 }
 

@@ -3,7 +3,7 @@
 
 #![expect(clippy::cast_possible_truncation, reason = "fields of a frame, which saturate")]
 
-use super::{DriveShaft, float, within};
+use super::{Drive, DriveShaft, float, within};
 use crate::frame::CanFrame;
 use crate::math::sqrt;
 use core::f64::consts::TAU;
@@ -16,15 +16,14 @@ const VELOCITY: u32 = 2;
 
 /// An ODrive axis with its shaft, for tests: takes frames, answers remote ones, sends cyclic frames, and moves.
 ///
-/// The axis is not a part of the [`Simulation`](crate::sim::Simulation): pass each frame of the
-/// [`Controller`](crate::sim::Sender::Controller) to [`hear`](Self::hear), and put the answer and the [cyclic frames](Self::next_frame) on the bus. States, modes, limits, errors and the watchdog are as in the firmware: if
-/// an axis in closed loop receives another request for closed loop, the axis drops the torque and begins anew. The endpoints of 0.6 have
-/// the numbers 1 to 4: control mode, input mode, watchdog time-out, watchdog enabled.
+/// [`Simulation::advance_drives`](crate::sim::Simulation::advance_drives) puts the axis on a bus. A command has no answer. States, modes,
+/// limits, errors and the watchdog are as in the firmware: if an axis in closed loop receives another request for closed loop, the axis drops
+/// the torque and begins anew. The endpoints of 0.6 have the numbers 1 to 4: control mode, input mode, watchdog time-out, watchdog enabled.
 ///
 /// # Examples
 /// ```
 /// use drivetrain::frame::CanFrame;
-/// use drivetrain::sim::OdriveDrive;
+/// use drivetrain::sim::{Drive, OdriveDrive};
 ///
 /// let mut drive = OdriveDrive::new(1, false, 0.05, 1.0); // node 1, firmware 0.5, 0.05 Nm/A, no gear
 /// let closed_loop = CanFrame::standard(0x027, [8, 0, 0, 0, 0, 0, 0, 0]).ok_or("an id")?;
@@ -190,68 +189,6 @@ impl OdriveDrive {
         &mut self.shaft
     }
 
-    /// Takes a frame from the bus and returns the answer. Returns `None` for a command, and if the frame is not for this axis.
-    pub fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
-        let Id::Standard(id) = frame.id() else { return None };
-        let (node, number) = (id.as_raw() >> 5, id.as_raw() & 0x1F);
-        if node != u16::from(self.node) || self.boot_s > 0.0 {
-            return None;
-        }
-        self.silence_s = 0.0;
-        if frame.is_remote_frame() {
-            return self.message(number);
-        }
-        let bits = u64::from_le_bytes(*frame.bytes());
-        let (low, high) = (bits as u32, (bits >> 32) as u32);
-        let milli = |shift: u32| f64::from(((bits >> shift) as u16).cast_signed()) / 1_000.0;
-        match number {
-            0x02 => self.fail(if self.is_0_6 { 0x0200_0000 } else { 0x4000 }),
-            0x04 if self.is_0_6 => return self.hear_endpoint(bits),
-            0x07 => self.request(low),
-            0x0B => (self.control_mode, self.input_mode) = (low, high),
-            0x0C => self.input = [float(low), milli(32), milli(48)],
-            0x0D => self.input = [self.input[0], float(low), float(high)],
-            0x0E => self.input[2] = float(low),
-            0x0F => (self.velocity_limit, self.current_limit) = (float(low), float(high)),
-            0x11 => self.trajectory_velocity = float(low),
-            0x12 => self.acceleration = float(low),
-            0x18 => (self.error, self.disarm_reason, self.procedure_result) = (0, 0, 0),
-            _ => {}
-        }
-        None
-    }
-
-    /// Returns the next cyclic frame; `None` until the next is due.
-    pub fn next_frame(&mut self) -> Option<CanFrame> {
-        if self.boot_s > 0.0 {
-            return None;
-        }
-        let messages = [0x01, 0x09];
-        for ((since, period), number) in self.since_s.iter_mut().zip(self.periods_s).zip(messages) {
-            if period > 0.0 && *since >= period - 1e-9 {
-                *since = 0.0;
-                return self.message(number);
-            }
-        }
-        None
-    }
-
-    /// Advances by a time in s.
-    pub fn step(&mut self, dt_s: f32) {
-        let dt_s = f64::from(dt_s);
-        self.silence_s += dt_s;
-        self.boot_s = (self.boot_s - dt_s).max(0.0);
-        for since in &mut self.since_s {
-            *since += dt_s;
-        }
-        if self.is_watched && self.silence_s > self.watchdog_s {
-            self.fail(if self.is_0_6 { 0x0100_0000 } else { 0x0800 });
-        }
-        let most = self.current_limit * self.torque_constant * self.gear.abs();
-        let wanted = if self.state == CLOSED_LOOP { self.wanted_nm(dt_s) } else { 0.0 };
-        self.shaft.step(within(wanted, most), dt_s);
-    }
-
     /// Returns the torque of the shaft that the loops demand.
     fn wanted_nm(&mut self, dt_s: f64) -> f64 {
         let [position, velocity, torque] = self.input;
@@ -359,6 +296,67 @@ impl OdriveDrive {
     fn frame(&self, number: u16, data: [u8; 8]) -> CanFrame {
         let id = StandardId::new(u16::from(self.node) << 5 | number).unwrap_or(StandardId::ZERO);
         CanFrame::of(Id::Standard(id), data)
+    }
+}
+
+impl Drive for OdriveDrive {
+    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
+        let Id::Standard(id) = frame.id() else { return None };
+        let (node, number) = (id.as_raw() >> 5, id.as_raw() & 0x1F);
+        if node != u16::from(self.node) || self.boot_s > 0.0 {
+            return None;
+        }
+        self.silence_s = 0.0;
+        if frame.is_remote_frame() {
+            return self.message(number);
+        }
+        let bits = u64::from_le_bytes(*frame.bytes());
+        let (low, high) = (bits as u32, (bits >> 32) as u32);
+        let milli = |shift: u32| f64::from(((bits >> shift) as u16).cast_signed()) / 1_000.0;
+        match number {
+            0x02 => self.fail(if self.is_0_6 { 0x0200_0000 } else { 0x4000 }),
+            0x04 if self.is_0_6 => return self.hear_endpoint(bits),
+            0x07 => self.request(low),
+            0x0B => (self.control_mode, self.input_mode) = (low, high),
+            0x0C => self.input = [float(low), milli(32), milli(48)],
+            0x0D => self.input = [self.input[0], float(low), float(high)],
+            0x0E => self.input[2] = float(low),
+            0x0F => (self.velocity_limit, self.current_limit) = (float(low), float(high)),
+            0x11 => self.trajectory_velocity = float(low),
+            0x12 => self.acceleration = float(low),
+            0x18 => (self.error, self.disarm_reason, self.procedure_result) = (0, 0, 0),
+            _ => {}
+        }
+        None
+    }
+
+    fn step(&mut self, dt_s: f32) {
+        let dt_s = f64::from(dt_s);
+        self.silence_s += dt_s;
+        self.boot_s = (self.boot_s - dt_s).max(0.0);
+        for since in &mut self.since_s {
+            *since += dt_s;
+        }
+        if self.is_watched && self.silence_s > self.watchdog_s {
+            self.fail(if self.is_0_6 { 0x0100_0000 } else { 0x0800 });
+        }
+        let most = self.current_limit * self.torque_constant * self.gear.abs();
+        let wanted = if self.state == CLOSED_LOOP { self.wanted_nm(dt_s) } else { 0.0 };
+        self.shaft.step(within(wanted, most), dt_s);
+    }
+
+    fn next_frame(&mut self) -> Option<CanFrame> {
+        if self.boot_s > 0.0 {
+            return None;
+        }
+        let messages = [0x01, 0x09];
+        for ((since, period), number) in self.since_s.iter_mut().zip(self.periods_s).zip(messages) {
+            if period > 0.0 && *since >= period - 1e-9 {
+                *since = 0.0;
+                return self.message(number);
+            }
+        }
+        None
     }
 }
 

@@ -7,7 +7,7 @@
     reason = "fields of a frame, which wrap as the drive's do"
 )]
 
-use super::DriveShaft;
+use super::{Drive, DriveShaft};
 use crate::frame::CanFrame;
 use embedded_can::{Frame, Id, StandardId};
 
@@ -40,13 +40,13 @@ const LASTING: u16 = 0x0092;
 /// The drive follows any command at once, and holds its last command until the time-out; a new drive has no time-out. "Off" ends the
 /// command and locks the holding brake. A velocity or a position releases the brake, a torque does not. After the time-out the output is
 /// off and the brake locked. The next frame is echoed without effect, and the command before the time-out holds again: the worst case, as
-/// the manual does not say whether the command holds. With an error the torque is zero. Frames of the manual that the family does not send
-/// are not answered.
+/// the manual does not say whether the command holds. The drive reports an expired time-out by itself, at once and then each second. With an
+/// error the torque is zero. Frames of the manual that the family does not send are not answered.
 ///
 /// # Examples
 /// ```
 /// use drivetrain::frame::CanFrame;
-/// use drivetrain::sim::RmdDrive;
+/// use drivetrain::sim::{Drive, RmdDrive};
 ///
 /// let mut drive = RmdDrive::new(1, 2.4); // Nm/A
 /// let torque = [0xA1, 0, 0, 0, 100, 0, 0, 0];
@@ -215,8 +215,48 @@ impl RmdDrive {
         self.timeout_ms
     }
 
-    /// Takes a frame from the bus and returns the answer. Returns `None` if the frame is not for this drive.
-    pub fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
+    fn wanted_nm(&self) -> f64 {
+        match self.command {
+            Command::None => 0.0,
+            Command::Torque(amperes) => amperes * self.torque_constant,
+            Command::Velocity(velocity) => self.shaft.following_nm(velocity.to_radians()),
+            Command::Position(angle, limit) => {
+                let velocity = 5.0 * (angle - self.degrees());
+                let limited = if limit > 0.0 { velocity.clamp(-limit, limit) } else { velocity };
+                self.shaft.following_nm(limited.to_radians())
+            }
+        }
+    }
+
+    fn lock(&mut self) {
+        if self.has_brake {
+            self.opening_s = None;
+        }
+    }
+
+    fn answer(&self, bits: u64) -> Option<CanFrame> {
+        let id = StandardId::new(0x240 + u16::from(self.id))?;
+        Some(CanFrame::of(Id::Standard(id), bits.to_le_bytes()))
+    }
+
+    /// Returns bytes 1 to 7 of a feedback frame.
+    fn feedback(&self) -> u64 {
+        let current = (self.shaft.torque_nm / self.torque_constant * 100.0) as i16;
+        let velocity = self.shaft.velocity_rad_per_s.to_degrees() as i16;
+        let degrees = floor(self.degrees()) as i64 as i16;
+        u64::from(self.temperature_c as u8) << 8
+            | u64::from(current as u16) << 16
+            | u64::from(velocity as u16) << 32
+            | u64::from(degrees as u16) << 48
+    }
+
+    fn degrees(&self) -> f64 {
+        self.shaft.angle_rad.to_degrees() - self.zero_deg
+    }
+}
+
+impl Drive for RmdDrive {
+    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
         let own = StandardId::new(0x140 + u16::from(self.id))?;
         let is_for_it = [Some(own), StandardId::new(ALL)]
             .into_iter()
@@ -274,17 +314,7 @@ impl RmdDrive {
         }
     }
 
-    /// Returns the frame that reports an expired time-out: once at the end of the time-out, then each second.
-    pub fn report(&mut self) -> Option<CanFrame> {
-        if !self.is_expired || self.unreported_s < 1.0 {
-            return None;
-        }
-        self.unreported_s = 0.0;
-        self.answer(EXPIRED)
-    }
-
-    /// Advances by a time in s.
-    pub fn step(&mut self, dt_s: f32) {
+    fn step(&mut self, dt_s: f32) {
         let dt_s = f64::from(dt_s);
         self.starting_s -= dt_s;
         self.silent_s += dt_s;
@@ -303,43 +333,12 @@ impl RmdDrive {
         }
     }
 
-    fn wanted_nm(&self) -> f64 {
-        match self.command {
-            Command::None => 0.0,
-            Command::Torque(amperes) => amperes * self.torque_constant,
-            Command::Velocity(velocity) => self.shaft.following_nm(velocity.to_radians()),
-            Command::Position(angle, limit) => {
-                let velocity = 5.0 * (angle - self.degrees());
-                let limited = if limit > 0.0 { velocity.clamp(-limit, limit) } else { velocity };
-                self.shaft.following_nm(limited.to_radians())
-            }
+    fn next_frame(&mut self) -> Option<CanFrame> {
+        if !self.is_expired || self.unreported_s < 1.0 {
+            return None;
         }
-    }
-
-    fn lock(&mut self) {
-        if self.has_brake {
-            self.opening_s = None;
-        }
-    }
-
-    fn answer(&self, bits: u64) -> Option<CanFrame> {
-        let id = StandardId::new(0x240 + u16::from(self.id))?;
-        Some(CanFrame::of(Id::Standard(id), bits.to_le_bytes()))
-    }
-
-    /// Returns bytes 1 to 7 of a feedback frame.
-    fn feedback(&self) -> u64 {
-        let current = (self.shaft.torque_nm / self.torque_constant * 100.0) as i16;
-        let velocity = self.shaft.velocity_rad_per_s.to_degrees() as i16;
-        let degrees = floor(self.degrees()) as i64 as i16;
-        u64::from(self.temperature_c as u8) << 8
-            | u64::from(current as u16) << 16
-            | u64::from(velocity as u16) << 32
-            | u64::from(degrees as u16) << 48
-    }
-
-    fn degrees(&self) -> f64 {
-        self.shaft.angle_rad.to_degrees() - self.zero_deg
+        self.unreported_s = 0.0;
+        self.answer(EXPIRED)
     }
 }
 

@@ -6,8 +6,9 @@
     reason = "fields of a frame and parameters, which saturate"
 )]
 
-use super::{DriveShaft, float, within};
+use super::{Drive, DriveShaft, float, within};
 use crate::frame::CanFrame;
+use crate::robstride::Model;
 use embedded_can::{ExtendedId, Frame, Id};
 
 /// Parameter indices of the drive, in the order of their places.
@@ -28,19 +29,19 @@ const VBUS: u16 = 0x701C;
 
 /// A RobStride drive with its shaft, for tests: takes frames, answers them, and moves.
 ///
-/// The drive is not a part of the [`Simulation`](crate::sim::Simulation): pass each frame of the
-/// [`Controller`](crate::sim::Sender::Controller) to [`hear`](Self::hear), and put the answer on the bus. Run modes 0 to 3 and 5, parameters, faults and the time-out are as in the manual. The torque constant is 1 Nm/A. When
-/// enabled, the drive follows the targets already set. The reported position starts again at the other end of its range; a
-/// [CyberGear](Self::cybergear) clamps the position at the end. An operation frame names no host, so the drive answers to the host of the
-/// last frame with one.
+/// [`Simulation::advance_drives`](crate::sim::Simulation::advance_drives) puts the drive on a bus. Run modes 0 to 3 and 5, parameters,
+/// faults and the time-out are as in the manual. The torque constant is 1 Nm/A. When enabled, the drive follows the targets already set. The
+/// reported position starts again at the other end of its range; a CyberGear clamps the position at the end. An operation frame names no
+/// host, so the drive answers to the host of the last frame with one.
 ///
 /// # Examples
 /// ```
 /// use drivetrain::frame::CanFrame;
-/// use drivetrain::sim::RobStrideDrive;
+/// use drivetrain::robstride::Model;
+/// use drivetrain::sim::{Drive, RobStrideDrive};
 /// use embedded_can::ExtendedId;
 ///
-/// let mut drive = RobStrideDrive::new(1, [12.57, 44.0, 17.0, 500.0, 5.0]); // the ranges of an RS02
+/// let mut drive = RobStrideDrive::of(Model::RS02, 1);
 /// let enable = CanFrame::of(ExtendedId::new(0x0300_FD01).ok_or("29 bits")?, [0; 8]);
 /// let answer = drive.hear(&enable).ok_or("no answer")?;
 /// assert_eq!(format!("{answer:?}"), "028001FD [8] 7F FF 7F FF 7F FF 00 FA"); // it runs, at 25.0 °C
@@ -67,10 +68,12 @@ pub struct RobStrideDrive {
 }
 
 impl RobStrideDrive {
-    /// Makes a drive with an id and the ranges of position in rad, velocity in rad/s, torque in Nm, kp and kd. The drive is in operation
-    /// mode, without a time-out, with an inertia of 0.01 kg m².
+    /// Makes a drive of a model with an id. The drive is in operation mode, without a time-out, with an inertia of 0.01 kg m². A CyberGear
+    /// has position mode 1, no parameter for a time-out, and no frame that stores parameters.
     #[must_use]
-    pub fn new(id: u8, ranges: [f32; 5]) -> Self {
+    pub fn of(model: Model, id: u8) -> Self {
+        let [kp, kd] = [model.most().stiffness, model.most().damping];
+        let ranges = [model.pmax_rad(), model.vmax_rad_per_s(), model.tmax_nm(), kp, kd];
         let ranges = ranges.map(f64::from);
         let [_, velocity, torque, ..] = ranges;
         let values = [0.0, 0.0, 0.0, torque, 0.0, velocity, torque, 0.0];
@@ -78,7 +81,7 @@ impl RobStrideDrive {
             id,
             host: 0,
             ranges,
-            is_cybergear: false,
+            is_cybergear: !model.has_timeout(),
             values,
             stored: values,
             is_enabled: false,
@@ -89,13 +92,6 @@ impl RobStrideDrive {
             operation: [0.0; 5],
             shaft: DriveShaft::new(0.01, 0.01),
         }
-    }
-
-    /// Makes a CyberGear with an id: position mode 1, no time-out, and no frame that stores parameters.
-    #[must_use]
-    pub fn cybergear(id: u8) -> Self {
-        let pmax = 4.0 * core::f32::consts::PI;
-        Self { is_cybergear: true, ..Self::new(id, [pmax, 30.0, 12.0, 500.0, 5.0]) }
     }
 
     /// Sets and stores a parameter: the value survives a loss of the supply. An unknown parameter is ignored.
@@ -169,61 +165,6 @@ impl RobStrideDrive {
     #[must_use]
     pub const fn bit_rate(&self) -> u8 {
         self.bit_rate
-    }
-
-    /// Takes a frame from the bus and returns the answer. Returns `None` if the frame is not for this drive.
-    pub fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
-        let Id::Extended(id) = frame.id() else { return None };
-        let id = id.as_raw();
-        if !frame.is_data_frame() || frame.length() != 8 || id & 0xFF != u32::from(self.id) {
-            return None;
-        }
-        let (kind, middle) = (id >> 24, id >> 8 & 0xFFFF);
-        let data = u64::from_be_bytes(*frame.bytes());
-        let index = (*frame.bytes()).first_chunk().map_or(0, |index| u16::from_le_bytes(*index));
-        if kind != 1 {
-            self.host = middle as u8;
-        }
-        self.silence_s = 0.0;
-        match kind {
-            0 => return Some(self.broadcast()),
-            1 => self.operation = self.fields(middle, data),
-            3 => self.is_enabled = self.faults == 0 && !self.is_calibrating,
-            4 => {
-                self.is_enabled = false;
-                self.is_calibrating = false;
-                if data >> 56 == 1 {
-                    self.faults = 0;
-                } else if data >> 48 == 0x00C4 {
-                    return Some(self.answer(2, self.state(), [0, 0xC4, 0x56, 0, 0, 3, 6, 0]));
-                }
-            }
-            6 if data >> 56 == 1 => {
-                self.shaft.angle_rad = 0.0;
-            }
-            7 => {
-                self.id = (middle >> 8) as u8;
-                return Some(self.broadcast());
-            }
-            17 => return Some(self.read(index, *frame.bytes())),
-            18 => self.set(index, data as u32),
-            22 if self.is_cybergear => self.bit_rate = (data >> 56) as u8,
-            22 if data == 0x0102_0304_0506_0708 => self.stored = self.values,
-            _ => return None,
-        }
-        Some(self.feedback())
-    }
-
-    /// Advances by a time in s.
-    pub fn step(&mut self, dt_s: f32) {
-        let dt_s = f64::from(dt_s);
-        self.silence_s += dt_s;
-        let timeout_s = self.value(TIMEOUT) * 50e-6;
-        if timeout_s > 0.0 && self.silence_s > timeout_s {
-            self.is_enabled = false;
-        }
-        let wanted = if self.is_enabled { self.wanted_nm() } else { 0.0 };
-        self.shaft.step(wanted, dt_s);
     }
 
     fn wanted_nm(&self) -> f64 {
@@ -347,6 +288,61 @@ impl RobStrideDrive {
                 *place = value;
             }
         }
+    }
+}
+
+impl Drive for RobStrideDrive {
+    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
+        let Id::Extended(id) = frame.id() else { return None };
+        let id = id.as_raw();
+        if !frame.is_data_frame() || frame.length() != 8 || id & 0xFF != u32::from(self.id) {
+            return None;
+        }
+        let (kind, middle) = (id >> 24, id >> 8 & 0xFFFF);
+        let data = u64::from_be_bytes(*frame.bytes());
+        let index = (*frame.bytes()).first_chunk().map_or(0, |index| u16::from_le_bytes(*index));
+        if kind != 1 {
+            self.host = middle as u8;
+        }
+        self.silence_s = 0.0;
+        match kind {
+            0 => return Some(self.broadcast()),
+            1 => self.operation = self.fields(middle, data),
+            3 => self.is_enabled = self.faults == 0 && !self.is_calibrating,
+            4 => {
+                self.is_enabled = false;
+                self.is_calibrating = false;
+                if data >> 56 == 1 {
+                    self.faults = 0;
+                } else if data >> 48 == 0x00C4 {
+                    return Some(self.answer(2, self.state(), [0, 0xC4, 0x56, 0, 0, 3, 6, 0]));
+                }
+            }
+            6 if data >> 56 == 1 => {
+                self.shaft.angle_rad = 0.0;
+            }
+            7 => {
+                self.id = (middle >> 8) as u8;
+                return Some(self.broadcast());
+            }
+            17 => return Some(self.read(index, *frame.bytes())),
+            18 => self.set(index, data as u32),
+            22 if self.is_cybergear => self.bit_rate = (data >> 56) as u8,
+            22 if data == 0x0102_0304_0506_0708 => self.stored = self.values,
+            _ => return None,
+        }
+        Some(self.feedback())
+    }
+
+    fn step(&mut self, dt_s: f32) {
+        let dt_s = f64::from(dt_s);
+        self.silence_s += dt_s;
+        let timeout_s = self.value(TIMEOUT) * 50e-6;
+        if timeout_s > 0.0 && self.silence_s > timeout_s {
+            self.is_enabled = false;
+        }
+        let wanted = if self.is_enabled { self.wanted_nm() } else { 0.0 };
+        self.shaft.step(wanted, dt_s);
     }
 }
 

@@ -5,7 +5,7 @@
     reason = "fields of a frame, which saturate, and a tachometer, which wraps"
 )]
 
-use super::{DriveShaft, within};
+use super::{Drive, DriveShaft, within};
 use crate::frame::CanFrame;
 use core::f64::consts::TAU;
 use embedded_can::{ExtendedId, Frame, Id};
@@ -18,6 +18,9 @@ const LEAST_CURRENT: f64 = 0.05;
 
 /// Speeds below count as 0, in electrical rpm.
 const LEAST_SPEED: f64 = 900.0;
+
+/// Packets of the status frames that a drive sends by itself, the last one first: status 1, 4 and 5.
+const STATUSES: [u8; 3] = [9, 16, 27];
 
 /// The motor behind a simulated VESC.
 #[derive(Debug, Clone, Copy)]
@@ -36,13 +39,13 @@ pub struct VescMotor {
 
 /// A VESC with its shaft, for tests: takes frames, answers requests for its fault code, and moves.
 ///
-/// The drive is not a part of the [`Simulation`](crate::sim::Simulation): pass each frame of the
-/// [`Controller`](crate::sim::Sender::Controller) to [`hear`](Self::hear), and put the answers and the status frames of [`report`](Self::report) on the bus. If commands stop, the drive brakes with its time-out current.
-/// After a fault, commands are ignored for half a second. The shaft is an inertia with viscous friction.
+/// [`Simulation::advance_drives`](crate::sim::Simulation::advance_drives) puts the drive on a bus. The drive sends status frames by itself
+/// once [`with_status_hz`](Self::with_status_hz) sets a rate. If commands stop, the drive brakes with its time-out current. After a fault,
+/// commands are ignored for half a second. The shaft is an inertia with viscous friction.
 ///
 /// # Examples
 /// ```
-/// use drivetrain::sim::{VescDrive, VescMotor};
+/// use drivetrain::sim::{Drive, VescDrive, VescMotor};
 ///
 /// let motor = VescMotor {
 ///     pole_pairs: 7,
@@ -51,10 +54,11 @@ pub struct VescMotor {
 ///     current_max_a: 40.0,
 ///     no_load_rad_per_s: 600.0,
 /// };
-/// let drive = VescDrive::new(23, motor);
-/// let status = drive.report(9).ok_or("no such status")?;
-/// assert_eq!((status.header() & 0x1FFF_FFFF, status.bytes()), (0x917, &[0; 8]));
-/// # Ok::<(), &str>(())
+/// let mut drive = VescDrive::new(23, motor).with_status_hz(500.0);
+/// assert_eq!(drive.next_frame(), None);
+/// drive.step(0.002);
+/// let packets = core::iter::from_fn(|| drive.next_frame()).map(|status| status.header() >> 8 & 0xFF);
+/// assert_eq!(packets.collect::<Vec<_>>(), [27, 16, 9]); // status 5, 4 and 1
 /// ```
 #[derive(Debug, Clone, Copy)]
 pub struct VescDrive {
@@ -68,6 +72,11 @@ pub struct VescDrive {
     silence_s: f64,
     timeout_s: f64,
     timeout_brake_a: f64,
+    /// Period of the status frames, 0 for never, and the time since the last ones.
+    status_s: f64,
+    since_status_s: f64,
+    /// Status frames of this period that are not sent yet.
+    unsent: usize,
     celsius: [f64; 2],
     /// Angle of the shaft when the tachometer had this count.
     zero: (f64, i32),
@@ -87,7 +96,8 @@ enum Command {
 }
 
 impl VescDrive {
-    /// Makes a drive at rest at 0, with a time-out of 1 s, a time-out brake current of 0, and an inertia of 0.01 kg m².
+    /// Makes a drive at rest at 0, with a time-out of 1 s, a time-out brake current of 0, no status frames, as at delivery, and an inertia of
+    /// 0.01 kg m².
     #[must_use]
     pub fn new(id: u8, motor: VescMotor) -> Self {
         Self {
@@ -99,6 +109,9 @@ impl VescDrive {
             silence_s: 0.0,
             timeout_s: 1.0,
             timeout_brake_a: 0.0,
+            status_s: 0.0,
+            since_status_s: 0.0,
+            unsent: 0,
             celsius: [30.0, 25.0],
             zero: (0.0, 0),
             held_rad: 0.0,
@@ -110,6 +123,13 @@ impl VescDrive {
     #[must_use]
     pub fn with_timeout(self, timeout_s: f32, brake_a: f32) -> Self {
         Self { timeout_s: timeout_s.into(), timeout_brake_a: brake_a.into(), ..self }
+    }
+
+    /// Sets the rate of status 5, 4 and 1, in this order: packets 27, 16 and 9. Any rate but a positive finite one sends none.
+    #[must_use]
+    pub fn with_status_hz(self, hz: f32) -> Self {
+        let status_s = if hz > 0.0 { 1.0 / f64::from(hz) } else { 0.0 };
+        Self { status_s, ..self }
     }
 
     /// Replaces the shaft.
@@ -150,6 +170,7 @@ impl VescDrive {
     pub fn lose_supply(&mut self) {
         self.zero = (self.shaft.angle_rad, 0);
         (self.fault, self.ignores_s, self.silence_s) = (0, 0.0, 0.0);
+        (self.since_status_s, self.unsent) = (0.0, 0);
         self.command = Command::Current(0.0);
     }
 
@@ -159,67 +180,11 @@ impl VescDrive {
         self.fault
     }
 
-    /// Takes a frame from the bus and returns the answer; `None` unless the frame is a request.
-    pub fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
-        let Id::Extended(id) = frame.id() else { return None };
-        let id = id.as_raw();
-        let is_own = id & 0xFF == u32::from(self.id) || id & 0xFF == 0xFF;
-        if !frame.is_data_frame() || !is_own {
-            return None;
-        }
-        let data = frame.data();
-        let packet = id >> 8;
-        if packet == 8 {
-            // Requested values come in a short message if they fit: the fault code alone is value 15.
-            let &[host, 0, 50, 0, 0, 0x80, 0, ..] = data else { return None };
-            return extended(8 << 8 | u32::from(host))
-                .map(|id| CanFrame::of(id, [self.id, 1, 50, 0, 0, 0x80, 0, self.fault]));
-        }
-        // A current frame of six bytes or more begins with a delay.
-        let from = if packet == 1 && data.len() >= 6 { 2 } else { 0 };
-        let bytes = data.get(from..)?.first_chunk::<4>()?;
-        let value = f64::from(i32::from_be_bytes(*bytes));
-        let limit = self.motor.current_max_a;
-        let command = match packet {
-            0 => Command::Duty(value / 1e5),
-            1 => Command::Current(value / 1e3),
-            2 => Command::Brake(value / 1e3),
-            3 => Command::Speed(value),
-            4 => Command::Position(value / 1e6),
-            10 => Command::Current(value / 1e5 * limit),
-            11 => Command::Brake(value / 1e5 * limit),
-            12 => Command::Handbrake(value / 1e3),
-            13 => Command::Handbrake(value / 1e5 * limit),
-            _ => return None,
-        };
-        self.silence_s = 0.0;
-        if self.ignores_s <= 0.0 {
-            self.follow(command);
-        }
-        None
-    }
-
     fn follow(&mut self, command: Command) {
         if !matches!(self.command, Command::Handbrake(_)) {
             self.held_rad = self.shaft.angle_rad;
         }
         self.command = command;
-    }
-
-    /// Advances by a time in s.
-    pub fn step(&mut self, dt_s: f32) {
-        let dt_s = f64::from(dt_s);
-        self.silence_s += dt_s;
-        self.ignores_s -= dt_s;
-        if self.ignores_s <= 0.0 {
-            self.fault = 0;
-        }
-        if self.timeout_s > 0.0 && self.silence_s > self.timeout_s {
-            self.follow(Command::Brake(self.timeout_brake_a));
-        }
-        let current = self.wanted_nm() / self.nm_per_a();
-        let most = self.motor.current_max_a;
-        self.shaft.step(within(current, most) * self.nm_per_a(), dt_s);
     }
 
     /// Returns a status frame by its packet: 9, 14, 15, 16, 27 or 58; `None` for any other.
@@ -287,6 +252,72 @@ impl VescDrive {
                 shaft.following_nm(10.0 * way)
             }
         }
+    }
+}
+
+impl Drive for VescDrive {
+    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
+        let Id::Extended(id) = frame.id() else { return None };
+        let id = id.as_raw();
+        let is_own = id & 0xFF == u32::from(self.id) || id & 0xFF == 0xFF;
+        if !frame.is_data_frame() || !is_own {
+            return None;
+        }
+        let data = frame.data();
+        let packet = id >> 8;
+        if packet == 8 {
+            // Requested values come in a short message if they fit: the fault code alone is value 15.
+            let &[host, 0, 50, 0, 0, 0x80, 0, ..] = data else { return None };
+            return extended(8 << 8 | u32::from(host))
+                .map(|id| CanFrame::of(id, [self.id, 1, 50, 0, 0, 0x80, 0, self.fault]));
+        }
+        // A current frame of six bytes or more begins with a delay.
+        let from = if packet == 1 && data.len() >= 6 { 2 } else { 0 };
+        let bytes = data.get(from..)?.first_chunk::<4>()?;
+        let value = f64::from(i32::from_be_bytes(*bytes));
+        let limit = self.motor.current_max_a;
+        let command = match packet {
+            0 => Command::Duty(value / 1e5),
+            1 => Command::Current(value / 1e3),
+            2 => Command::Brake(value / 1e3),
+            3 => Command::Speed(value),
+            4 => Command::Position(value / 1e6),
+            10 => Command::Current(value / 1e5 * limit),
+            11 => Command::Brake(value / 1e5 * limit),
+            12 => Command::Handbrake(value / 1e3),
+            13 => Command::Handbrake(value / 1e5 * limit),
+            _ => return None,
+        };
+        self.silence_s = 0.0;
+        if self.ignores_s <= 0.0 {
+            self.follow(command);
+        }
+        None
+    }
+
+    fn step(&mut self, dt_s: f32) {
+        let dt_s = f64::from(dt_s);
+        self.silence_s += dt_s;
+        self.ignores_s -= dt_s;
+        self.since_status_s += dt_s;
+        if self.status_s > 0.0 && self.since_status_s >= self.status_s - 1e-9 {
+            self.since_status_s = (self.since_status_s - self.status_s).max(0.0).min(self.status_s);
+            self.unsent = STATUSES.len();
+        }
+        if self.ignores_s <= 0.0 {
+            self.fault = 0;
+        }
+        if self.timeout_s > 0.0 && self.silence_s > self.timeout_s {
+            self.follow(Command::Brake(self.timeout_brake_a));
+        }
+        let current = self.wanted_nm() / self.nm_per_a();
+        let most = self.motor.current_max_a;
+        self.shaft.step(within(current, most) * self.nm_per_a(), dt_s);
+    }
+
+    fn next_frame(&mut self) -> Option<CanFrame> {
+        self.unsent = self.unsent.checked_sub(1)?;
+        self.report(*STATUSES.get(self.unsent)?)
     }
 }
 

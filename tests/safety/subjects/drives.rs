@@ -8,7 +8,7 @@ use drivetrain::damiao;
 use drivetrain::encoder::GearRatio;
 use drivetrain::motor::{AngleDrive, CanDevice, Devices, ImpedanceControl, Own, OwnMotor};
 use drivetrain::robstride;
-use drivetrain::sim::{DamiaoDrive, RobStrideDrive};
+use drivetrain::sim::{DamiaoDrive, Drive, RobStrideDrive};
 use drivetrain::units::{Angle, AngularVelocity};
 use drivetrain::vesc;
 use embedded_can::{ExtendedId, Frame};
@@ -90,7 +90,7 @@ impl<const FOLLOWS: bool> Damiao<FOLLOWS> {
         setup: Setup,
     ) -> Self {
         let motor = damiao::Motor::new(damiao::Model::J4310, 1, mode).unwrap();
-        let drive = DamiaoDrive::new(1, 0x11, [12.5, 30.0, 10.0]).with_register(10, number);
+        let drive = DamiaoDrive::of(damiao::Model::J4310, 1).with_register(10, number);
         Self { motor: own(motor, setup), drive, output: Output::new(read), set }
     }
 
@@ -204,7 +204,7 @@ impl RobStride {
 
     fn new(mode: impl Into<robstride::Mode>, full_nm: f32, setup: Setup) -> Self {
         let motor = robstride::Motor::new(robstride::Model::RS02, 1, mode).unwrap();
-        let drive = RobStrideDrive::new(1, [12.566, 44.0, 17.0, 500.0, 5.0]);
+        let drive = RobStrideDrive::of(robstride::Model::RS02, 1);
         Self { motor: own(motor, setup), drive, has_commanded: false, full_nm }
     }
 

@@ -7,7 +7,7 @@ use drivetrain::motor::{
     AngleDrive, CanDevice, Devices, ImpedanceControl, Own, OwnMotor, VelocityDrive,
 };
 use drivetrain::rmd;
-use drivetrain::sim::{LkDrive, RmdDrive};
+use drivetrain::sim::{self, Drive as _, LkDrive, RmdDrive};
 use drivetrain::units::{Angle, AngularVelocity};
 
 /// The value of the four last bytes of a command of LK or MyActuator, in rad or rad/s: a unit is 0.01 degree.
@@ -23,17 +23,13 @@ fn is_order(frame: &CanFrame) -> bool {
 }
 
 /// A simulated drive of either family.
-pub(crate) trait Drive: Copy {
-    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame>;
+pub(crate) trait Drive: sim::Drive + Copy {
     fn is_on(&self) -> bool;
     /// Returns the torque that the drive gives now, in Nm; `None` for a drive that is off.
     fn torque_nm(self) -> Option<f32>;
 }
 
 impl Drive for LkDrive {
-    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
-        self.hear(frame)
-    }
     fn is_on(&self) -> bool {
         self.is_on()
     }
@@ -44,9 +40,6 @@ impl Drive for LkDrive {
 }
 
 impl Drive for RmdDrive {
-    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
-        self.hear(frame)
-    }
     fn is_on(&self) -> bool {
         self.is_on()
     }
@@ -86,7 +79,7 @@ fn angle<M: OwnMotor>(motor: &mut Own<M>, value: f32) -> Result<(), TargetError>
 impl<const FOLLOWS: bool> Lk<FOLLOWS> {
     fn of(mode: impl Into<lk::Mode>, set: Set<lk::Motor>, setup: Setup) -> Self {
         let motor = lk::Motor::new(lk::Model::MF9025_16T, 1, mode).unwrap();
-        Self::new(motor, LkDrive::new(1, 33.0 / 4096.0, 0.32, 1.0, 16), set, setup)
+        Self::new(motor, LkDrive::of(lk::Model::MF9025_16T, 1), set, setup)
     }
 }
 

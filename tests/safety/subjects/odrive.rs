@@ -4,7 +4,7 @@ use super::drives::{Output, own, rules};
 use super::*;
 use drivetrain::motor::{AngleDrive, CanDevice, Devices, ImpedanceControl, Own, OwnMotor};
 use drivetrain::odrive::{Firmware, Heartbeat, Mode, Model, Motor};
-use drivetrain::sim::OdriveDrive;
+use drivetrain::sim::{Drive, OdriveDrive};
 use drivetrain::units::{Angle, AngularVelocity};
 use embedded_can::{Frame, StandardId};
 

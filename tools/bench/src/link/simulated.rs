@@ -4,11 +4,10 @@ use super::{Heard, Taken};
 use crate::drive::{MOTOR_NM_PER_A, master_id};
 use crate::motors::{Model, Spec};
 use drivetrain::frame::CanFrame;
-use drivetrain::lk::Series;
 use drivetrain::odrive::Firmware;
 use drivetrain::sim::{
-    DamiaoDrive, DriveShaft, Fault, Line, LkDrive, MotorConfig, MotorKey, OdriveDrive, RmdDrive,
-    RobStrideDrive, Sender, Simulation, VescDrive, VescMotor,
+    DamiaoDrive, Drive, DriveShaft, Fault, Line, LkDrive, MotorConfig, MotorKey, OdriveDrive,
+    RmdDrive, RobStrideDrive, Simulation, VescDrive, VescMotor,
 };
 use drivetrain::time::{Duration, Instant};
 use embedded_can::{Error as _, nb::Can};
@@ -51,7 +50,6 @@ struct Motor {
 pub(crate) struct Simulated {
     world: Simulation,
     motors: Vec<Motor>,
-    steps: u64,
 }
 
 impl Simulated {
@@ -69,35 +67,23 @@ impl Simulated {
             Ok(Motor { place, silent_until: Instant::START })
         });
         let motors = motors.collect::<Result<_, String>>()?;
-        Ok(Self { world, motors, steps: 0 })
+        Ok(Self { world, motors })
     }
 
     /// Moves the world on by a quarter of a millisecond.
     pub(crate) fn advance(&mut self) -> Duration {
         let now = self.world.now();
-        let mut answers = Vec::new();
-        let motors = &mut self.motors;
-        self.world.advance_with(STEP, |record| {
-            // The answers of LK have the id of its commands.
-            if record.sender != Sender::Controller {
-                return;
-            }
-            for motor in motors.iter_mut().filter(|motor| motor.silent_until <= now) {
-                if let Place::Own(kind) = &mut motor.place {
-                    answers.extend(kind.hear(&record.frame));
-                }
-            }
-        });
-        for motor in motors {
-            if let Place::Own(kind) = &mut motor.place {
-                kind.step(self.steps, &mut answers);
+        let mut drives: Vec<(Line, &mut dyn Drive)> = Vec::new();
+        for motor in &mut self.motors {
+            let Place::Own(kind) = &mut motor.place else { continue };
+            if motor.silent_until <= now {
+                drives.push((BUS, kind.drive()));
+            } else {
+                kind.drive().step(STEP.as_secs_f32());
             }
         }
-        self.steps += 1;
-        for answer in answers {
-            // A bus that is full of foreign frames loses an answer, as a real one does.
-            _ = self.world.inject(BUS, answer);
-        }
+        // A bus that is full of foreign frames loses an answer, as a real one does.
+        _ = self.world.advance_drives(STEP, &mut drives);
         STEP
     }
 
@@ -169,33 +155,20 @@ fn kind(spec: Spec) -> Option<Kind> {
     let id = spec.id;
     Some(match spec.model {
         Model::Damiao(model) => {
-            let ranges = [model.pmax_rad(), model.vmax_rad_per_s(), model.tmax_nm()];
-            let drive = DamiaoDrive::new(id, master_id(spec), ranges).with_register(10, 1.0);
+            let drive = DamiaoDrive::of(model, id).with_register(7, f32::from(master_id(spec)));
             Kind::Damiao(drive.with_shaft(shaft(0.3 * model.tmax_nm())))
         }
         Model::Lk(model) => {
-            let amperes = match model.series() {
-                Series::Mf => 33.0 / 4096.0,
-                Series::Mg => 66.0 / 4096.0,
-            };
-            let (constant, gear) = (model.torque_constant(), model.gear());
-            let drive = LkDrive::new(id, amperes, constant, gear, model.encoder_bits());
-            Kind::Lk(drive.with_shaft(shaft(0.3 * model.max_torque_nm())))
+            let shaft = shaft(0.3 * model.max_torque_nm());
+            Kind::Lk(LkDrive::of(model, id).with_shaft(shaft))
         }
         Model::Rmd(model) => {
             let drive = RmdDrive::new(id, model.torque_constant());
             Kind::Rmd(drive.with_shaft(shaft(0.3 * model.max_torque_nm())))
         }
         Model::RobStride(model) => {
-            let drive = if model.has_timeout() && model.name() != "CyberGear" {
-                let most = model.most();
-                let ranges = [model.pmax_rad(), model.vmax_rad_per_s(), model.tmax_nm()];
-                let [pmax, vmax, tmax] = ranges;
-                RobStrideDrive::new(id, [pmax, vmax, tmax, most.stiffness, most.damping])
-            } else {
-                RobStrideDrive::cybergear(id)
-            };
-            Kind::RobStride(drive.with_shaft(shaft(0.3 * model.tmax_nm())))
+            let shaft = shaft(0.3 * model.tmax_nm());
+            Kind::RobStride(RobStrideDrive::of(model, id).with_shaft(shaft))
         }
         Model::Odrive(firmware) => {
             let is_0_6 = firmware == Firmware::V0_6;
@@ -210,7 +183,7 @@ fn kind(spec: Spec) -> Option<Kind> {
                 current_max_a: 60.0,
                 no_load_rad_per_s: 600.0,
             };
-            let drive = VescDrive::new(id, motor).with_timeout(0.1, 0.0);
+            let drive = VescDrive::new(id, motor).with_timeout(0.1, 0.0).with_status_hz(500.0);
             Kind::Vesc(drive.with_shaft(shaft(0.35)))
         }
         Model::M3508 | Model::M2006 | Model::Gm6020 | Model::Gm6020Current => return None,
@@ -232,21 +205,8 @@ macro_rules! each {
 }
 
 impl Kind {
-    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
-        each!(self, drive => drive.hear(frame))
-    }
-
-    /// Moves the drive on, and has it report what it reports by itself: a VESC at 500 Hz.
-    fn step(&mut self, steps: u64, answers: &mut Vec<CanFrame>) {
-        each!(self, drive => drive.step(0.000_25));
-        match self {
-            Self::Odrive(drive) => answers.extend(drive.next_frame()),
-            Self::Vesc(drive) if steps.is_multiple_of(8) => {
-                answers.extend(drive.report(9));
-            }
-            Self::Vesc(drive) if steps.is_multiple_of(401) => answers.extend(drive.report(16)),
-            _ => {}
-        }
+    fn drive(&mut self) -> &mut dyn Drive {
+        each!(self, drive => drive)
     }
 
     #[cfg(test)]
