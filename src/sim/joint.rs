@@ -1,9 +1,9 @@
 //! Joint motors: drives with a position loop of their own.
 
+use super::Line;
 use super::can::Mailboxes;
 use super::esc::Random;
 use super::motor::{MotorState, position, wrapped};
-use super::{Line, MotorKey, SimError, Simulation};
 use crate::frame::CanFrame;
 use crate::math::sqrt;
 use crate::snake::{IDS, PULSES_PER_TURN, Register};
@@ -11,7 +11,7 @@ use crate::time::Duration;
 use crate::units::{AngularVelocity, Current};
 use embedded_can::{Frame, StandardId};
 
-/// A joint of a snake robot to attach to a [`Simulation`].
+/// A joint of a snake robot to attach to a [`Simulation`](super::Simulation).
 ///
 /// A joint speaks the protocol of [`snake`](crate::snake). **Its behaviour is an estimate**: the joint moves to its target
 /// with the speed, acceleration and deceleration of its registers, its shaft 2 ms behind; it answers 150 to 250 µs after a
@@ -81,16 +81,6 @@ impl JointConfig {
     #[must_use]
     pub const fn with_latency(self, latency: Duration) -> Self {
         Self { latency, ..self }
-    }
-}
-
-impl Simulation {
-    /// Puts a joint on a bus. Two with the same id are possible, as in reality.
-    ///
-    /// # Errors
-    /// When there is no such id, or when there are 12 joints already.
-    pub fn attach_joint(&self, config: JointConfig) -> Result<MotorKey, SimError> {
-        self.with(|engine| engine.attach_joint(config))
     }
 }
 

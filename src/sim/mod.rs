@@ -169,6 +169,14 @@ impl Simulation {
         self.with(|engine| engine.attach(config))
     }
 
+    /// Puts a joint on a bus. Two with the same id are possible, as in reality.
+    ///
+    /// # Errors
+    /// When there is no such id, or when there are 12 joints already.
+    pub fn attach_joint(&self, config: JointConfig) -> Result<MotorKey, SimError> {
+        self.with(|engine| engine.attach_joint(config))
+    }
+
     /// Returns the driver's end of the first bus.
     #[must_use]
     pub const fn controller(&self) -> Controller<'_> {
