@@ -9,7 +9,9 @@ use drivetrain::motor::{
     AngleDrive, CanDevice, Devices, Impedance, ImpedanceControl, Ingest, Own, OwnMotor, Role,
     VelocityDrive,
 };
-use drivetrain::sim::{DamiaoDrive, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive, VescMotor};
+use drivetrain::sim::{
+    DamiaoDrive, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive, VescMotor,
+};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use drivetrain::{damiao, lk, odrive, rmd, robstride, vesc};

@@ -1,6 +1,8 @@
 //! The simulated drives that judge own motors.
 
-use drivetrain::sim::{self, DamiaoDrive, DriveShaft, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive};
+use drivetrain::sim::{
+    self, DamiaoDrive, DriveShaft, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive,
+};
 
 /// A simulated drive.
 pub trait Drive: sim::Drive {

@@ -10,7 +10,9 @@ use drivetrain::control::PidConfig;
 use drivetrain::encoder::GearRatio;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Devices, ImpedanceControl, Ingest, Own, OwnMotor, VelocityDrive};
-use drivetrain::sim::{self, DriveShaft, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive, VescMotor};
+use drivetrain::sim::{
+    self, DriveShaft, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive, VescMotor,
+};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::AngularVelocity;
 use drivetrain::{lk, odrive, rmd, robstride, vesc};

@@ -38,9 +38,8 @@ impl Arm {
             let motor = Motor::new(Model::J4310, black_box(id), mode).unwrap();
             Own::new(motor.with_master_id(master_id(id)).unwrap()).with_opening(Duration::ZERO)
         });
-        let drives = ids.map(|id| {
-            DamiaoDrive::of(Model::J4310, id).with_register(7, f32::from(master_id(id)))
-        });
+        let drives = ids
+            .map(|id| DamiaoDrive::of(Model::J4310, id).with_register(7, f32::from(master_id(id))));
         let mut arm = Self { joints, drives, answers: [None; MOTORS], now };
         for cycle in 0..300 {
             arm.cycle();
