@@ -168,12 +168,12 @@ impl Slot {
     /// Tells a loop from [`NO_LOOP`], the only one without limits.
     #[inline]
     const fn has_speed_loop(&self) -> bool {
-        is_limited(&self.speed.core)
+        self.speed.core.is_limited()
     }
 
     #[inline]
     const fn has_position_loop(&self) -> bool {
-        is_limited(&self.position)
+        self.position.is_limited()
     }
 
     /// Frees the slot; handles of the motor find nothing from now on.
@@ -343,11 +343,6 @@ impl Slot {
         let output = self.speed.step(goal, velocity, &TimeStep::of_motor(dt_s));
         loop_to_raw(output, self.raw_per_unit, self.range)
     }
-}
-
-/// Tells whether the output of a loop has limits.
-const fn is_limited(pid: &ErrorPid) -> bool {
-    pid.within_output_range(f32::MAX) < f32::MAX
 }
 
 fn needs(is_there: bool) -> Result<(), TargetError> {

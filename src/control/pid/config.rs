@@ -111,10 +111,9 @@ impl PidConfig {
         self.with_output_range(-limit, limit)
     }
 
-    /// Keeps the output in `lower..=upper`, `lower` below `upper`; otherwise as [`with_output_limit`](Self::with_output_limit).
-    pub const fn with_output_range(self, lower: f32, upper: f32) -> Self {
-        let ends = Parameters { output_lower: lower, output_upper: upper, ..self.parameters };
-        Self { parameters: ends, ..self }
+    /// Keeps the output from `output_lower` to `output_upper`, which is above `output_lower`; otherwise as [`with_output_limit`](Self::with_output_limit).
+    pub const fn with_output_range(self, output_lower: f32, output_upper: f32) -> Self {
+        Self { parameters: Parameters { output_lower, output_upper, ..self.parameters }, ..self }
     }
 
     /// Keeps the integral term (in units of the output) in ±`limit`, more than zero. Off by default.

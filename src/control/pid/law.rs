@@ -40,7 +40,7 @@ const _: () = assert!(size_of::<ErrorPid>() <= 72, "one for each motor of a bus"
 impl ErrorPid {
     /// Makes a change, or a step with a given error, as the whole controller does.
     pub(crate) fn as_pid<T>(&mut self, change: impl FnOnce(&mut Pid) -> T) -> T {
-        let mut whole = Pid { core: *self, ..Pid::NONE };
+        let mut whole = Pid::of_error(*self);
         let done = change(&mut whole);
         *self = whole.core;
         done
@@ -140,7 +140,7 @@ impl ErrorPid {
     }
 
     /// Ends a step, and returns its output.
-    pub(super) const fn keep(&mut self, output: f32, error: f32, rate: f32, integral: f32) -> f32 {
+    const fn keep(&mut self, output: f32, error: f32, rate: f32, integral: f32) -> f32 {
         self.output = output;
         self.error = error;
         self.rate = rate;
@@ -158,8 +158,13 @@ impl ErrorPid {
         self.options & NOT_PLAIN == 0
     }
 
+    /// Tells whether the output has limits.
+    pub(crate) const fn is_limited(&self) -> bool {
+        self.parameters.output_upper < f32::MAX
+    }
+
     /// Returns what the output limits leave of `value`.
-    pub(crate) const fn within_output_range(&self, value: f32) -> f32 {
+    pub(in crate::control) const fn within_output_range(&self, value: f32) -> f32 {
         limited(value, self.parameters.output_lower, self.parameters.output_upper)
     }
 
@@ -269,7 +274,15 @@ impl Pid {
             error = math::shortest(error, self.way);
             rate = math::shortest(measured - self.measurement, self.way) * step.per_dt;
         } else if self.way < 0.0 {
-            error = self.follow(error, measured, step);
+            // The tracked setpoint moves on: the linear tracking differentiator by Euler's rule. The setpoint of the last step is
+            // `measurement + error`, so only its rate has to be stored.
+            let (r, pace) = (-self.way, self.tracking_rate);
+            let is_known = self.measurement != UNKNOWN;
+            let last = if is_known { self.core.error - (measured - self.measurement) } else { 0.0 };
+            let (longest_s, pull) = (1.0 / r, r * (last - error) + 2.0 * pace);
+            let dt_s = if step.dt_s > longest_s { longest_s } else { step.dt_s };
+            self.tracking_rate = finite(pace - dt_s * (r * pull));
+            error = finite(last + dt_s * pace);
         }
         if self.core.options & DERIVATIVE_ON_ERROR != 0 {
             let way = self.core.error - error;
@@ -280,22 +293,8 @@ impl Pid {
             rate = self.core.rate;
             self.core.set_options(self.core.options & !REST_DERIVATIVE);
         }
-        let feed_forward = self.feed_forward(measured + error);
         self.measurement = measured;
-        self.core.full(error, rate, feed_forward, step)
-    }
-
-    /// Moves the tracked setpoint on, and returns its error: the linear tracking differentiator by Euler's rule.
-    ///
-    /// The setpoint of the last step is `measurement + error`, so only its rate has to be stored.
-    fn follow(&mut self, error: f32, measured: f32, step: &TimeStep) -> f32 {
-        let (r, rate) = (-self.way, self.tracking_rate);
-        let is_known = self.measurement != UNKNOWN;
-        let last = if is_known { self.core.error - (measured - self.measurement) } else { 0.0 };
-        let (longest_s, pull) = (1.0 / r, r * (last - error) + 2.0 * rate);
-        let dt_s = if step.dt_s > longest_s { longest_s } else { step.dt_s };
-        self.tracking_rate = finite(rate - dt_s * (r * pull));
-        finite(last + dt_s * rate)
+        self.core.full(error, rate, self.feed_forward(measured + error), step)
     }
 
     /// Holds the output and counts the step. If time passed without a measurement, D rests in the next good step: the travel

@@ -119,35 +119,38 @@ impl Pid {
     /// Names the parameter that is NaN, infinite, negative, zero where zero is invalid, or reversed.
     pub const fn new(config: PidConfig) -> Result<Self, ConfigError> {
         check!(config.validate());
-        let mut pid = Self::NONE;
-        pid.store(&config);
-        Ok(pid)
-    }
-
-    /// Knows neither gains nor options, and no step.
-    const NONE: Self = Self {
-        measurement: UNKNOWN,
-        core: ErrorPid {
+        let mut pid = Self::of_error(ErrorPid {
             error: UNKNOWN,
             rate: 0.0,
             output: 0.0,
             integral: 0.0,
             integral_gate: CLOSED,
             output_gate: CLOSED,
-            parameters: PidConfig::new(0.0, 0.0, 0.0).parameters,
+            parameters: config.parameters,
             options: 0,
             rejected: 0,
-        },
-        way: 0.0,
-        tracking_rate: 0.0,
-        static_gain: 0.0,
-        velocity_gain: 0.0,
-    };
+        });
+        pid.store(&config);
+        Ok(pid)
+    }
+
+    /// Adds what a controller knows of its setpoint: nothing yet.
+    const fn of_error(core: ErrorPid) -> Self {
+        Self {
+            measurement: UNKNOWN,
+            core,
+            way: 0.0,
+            tracking_rate: 0.0,
+            static_gain: 0.0,
+            velocity_gain: 0.0,
+        }
+    }
 
     /// Forgets everything but the configuration and the count of rejected steps: the next call is a first call.
     pub const fn reset(&mut self) {
         self.interrupt();
-        self.core.keep(0.0, UNKNOWN, 0.0, 0.0);
+        self.core.integral = 0.0;
+        self.core.output = 0.0;
         self.core.options &= !TRACK_OUTPUT;
     }
 
