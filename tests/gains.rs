@@ -11,7 +11,7 @@ use drivetrain::geometry::{Twist, Vec2};
 use drivetrain::motor::{AngleDrive, ImpedanceControl, Own};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{
-    ChassisConfig, DamiaoDrive, DriveShaft, Line, MotorConfig, Sender, Simulation, Wheel,
+    ChassisConfig, DamiaoDrive, DriveShaft, Line, MotorConfig, Simulation, Wheel,
 };
 use drivetrain::time::Duration;
 use drivetrain::units::{Angle, AngularVelocity};
@@ -341,18 +341,11 @@ fn swing(control: ImpedanceControl, inertia: f32) -> (f32, u32) {
     let joint = Own::new(damiao::Motor::new(damiao::Model::J4340, 1, control).unwrap());
     let world = Simulation::new(1);
     let mut drive =
-        DamiaoDrive::new(1, 0x11, [12.5, 10.0, 28.0]).with_shaft(DriveShaft::new(inertia, 0.01));
+        DamiaoDrive::of(damiao::Model::J4340, 1).with_shaft(DriveShaft::new(inertia, 0.01));
     let mut runner = Runner::new(Nb(world.controller()), world.clock(), joint);
     let (mut beyond, mut outside_ms) = (0.0_f32, 0);
     for ms in 0..5_000 {
-        world.advance_with(Duration::from_millis(1), |record| {
-            if record.sender == Sender::Controller
-                && let Some(answer) = drive.hear(&record.frame)
-            {
-                world.inject(Line::Can1, answer).unwrap();
-            }
-        });
-        (0..4).for_each(|_| drive.step(0.000_25));
+        world.advance_drives(Duration::from_millis(1), &mut [(Line::Can1, &mut drive)]).unwrap();
         runner.poll(16);
         let Some(tick) = runner.due() else { continue };
         if ms == 300 {

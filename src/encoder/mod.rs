@@ -226,14 +226,14 @@ pub(crate) struct Tachometer {
 }
 
 impl Tachometer {
-    /// Begins where the count of the drive is 0. Takes the counts for so many turns of the output shaft as the gear's fraction has,
-    /// negative for a shaft that turns the other way: their product is below 2^30.
+    /// Begins where the count of the drive is 0. Takes the counts for so many turns of the output shaft as the gear's fraction has: their
+    /// product is below 2^30.
     pub(crate) const fn new(turn: i32, output: i32) -> Self {
         Self { last: 0, turns: 0, phase: 0, turn, output }
     }
 
-    /// Takes a count of the drive; the count wraps. After a restart of the drive the angle begins at its new zero.
-    pub(crate) fn take(&mut self, count: i32) {
+    /// Takes a count of the drive, which wraps, and returns its change. After a restart of the drive the angle begins at its new zero.
+    pub(crate) fn take(&mut self, count: i32) -> i32 {
         let way = count.wrapping_sub(self.last);
         self.last = count;
         // Whole runs of the gear's fraction leave the phase alone.
@@ -243,6 +243,7 @@ impl Tachometer {
         self.turns += i64::from(runs) * i64::from(self.output);
         self.turns += i64::from(sum.checked_div_euclid(self.turn).unwrap_or_default());
         self.phase = sum.checked_rem_euclid(self.turn).unwrap_or_default();
+        way
     }
 
     /// Returns the position since the drive has started.

@@ -84,22 +84,16 @@ impl Model {
         ConfigError::check_limit("torque_constant_nm_per_a", self.torque_constant_nm_per_a, 1e6)?;
         ConfigError::check_limit("current_limit_a", self.current_limit_a, MOST_AMPERES)?;
         ConfigError::check_limit("torque limit in Nm", self.torque_limit_nm(), f32::MAX)?;
-        ConfigError::check_limit(
-            "max_velocity in rad/s",
-            self.max_velocity.as_rad_per_s(),
-            f32::MAX,
-        )?;
+        let fastest = self.max_velocity.as_rad_per_s();
+        ConfigError::check_limit("max_velocity in rad/s", fastest, f32::MAX)?;
         let speed = self.erpm_of(self.max_velocity).abs();
         ConfigError::check_limit("max_velocity in electrical rpm", speed, MOST_ERPM)?;
         // Counts of the tachometer are divided by this product in 32 bits.
         let turn = TACHO * u32::from(self.pole_pairs) * u32::from(self.gear.rotor());
         let product = turn.saturating_mul(u32::from(self.gear.output()));
         let most = f32::from_bits(0x4E7F_FFFF); // the last below 2^30
-        ConfigError::check_limit(
-            "pole_pairs times 6 times both numbers of gear",
-            product as f32,
-            most,
-        )
+        let name = "pole_pairs times 6 times both numbers of gear";
+        ConfigError::check_limit(name, product as f32, most)
     }
 }
 

@@ -1109,7 +1109,7 @@ fn a_damper_still_brakes_a_joint_that_is_faster_than_vmax() {
     let mut bench = Bench::new(mit(), 1.0);
     bench.own = Own::new(Motor::new(Model::J4340, 1, gains).unwrap());
     let shaft = DriveShaft::new(0.02, 0.0);
-    bench.drive = DamiaoDrive::new(1, 0x11, [12.5, 10.0, 28.0]).with_shaft(shaft);
+    bench.drive = DamiaoDrive::of(Model::J4340, 1).with_shaft(shaft);
     bench.steps(200, |_| {});
     bench.own.arm(bench.now()).unwrap();
     let (mut fastest, mut farthest) = (0.0_f32, 0.0_f32);

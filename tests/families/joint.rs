@@ -5,9 +5,14 @@ use crate::station::Station;
 use drivetrain::control::PidConfig;
 use drivetrain::error::ConfigError;
 use drivetrain::math::wrap_pi;
-use drivetrain::motor::{ImpedanceControl, Link, Own, OwnMotor, TargetError};
-use drivetrain::units::AngularVelocity;
+use drivetrain::motor::{
+    AngleDrive, Devices, Impedance, ImpedanceControl, Ingest, Link, Own, OwnMotor, TargetError,
+};
+use drivetrain::sim::{DamiaoDrive, Drive};
+use drivetrain::time::{Instant, Tick};
+use drivetrain::units::{Angle, AngularVelocity};
 use drivetrain::{damiao, lk, odrive, rmd, robstride, vesc};
+use std::f32::consts::TAU;
 
 /// Each family and mode, and a motor in it.
 fn stations() -> impl Iterator<Item = (String, fn() -> Station)> {
@@ -98,7 +103,7 @@ fn a_zero_found_by_the_program_ends_with_a_silence_of_100_ms() {
         station.device.set_present_angle(1.0).unwrap();
         let last = station.heard.last().copied();
         station.now_us += 300_000;
-        for frame in last {
+        if let Some(frame) = last {
             station.deliver(&frame);
         }
         lacks_its_zero(station, family.name);
@@ -129,7 +134,6 @@ fn each_family_changes_the_loops_that_run_here_and_refuses_others() {
     let position = PidConfig::new(10.0, 0.0, 0.0).with_output_limit(20.0);
     let speed = PidConfig::new(0.2, 1.0, 0.0);
     let loops = || ImpedanceControl::new(2.0).unwrap().with_loops(position, speed).unwrap();
-    let gains = || ImpedanceControl::new(2.0).unwrap().with_gains(20.0, 0.6).unwrap();
     let quick = AngularVelocity::from_rad_per_s(20.0);
     let axis =
         |mode| odrive::Motor::new(odrive::Model::D6374, odrive::Firmware::V0_6, 3, quick, mode);
@@ -155,4 +159,65 @@ fn each_family_changes_the_loops_that_run_here_and_refuses_others() {
     ] {
         assert_eq!(refused, [Err(ConfigError::Unsupported("loops")); 2]);
     }
+}
+
+/// A joint at 0.5 rad, whose zero is at 3 rad of the drive, so that the drive passes half a turn.
+#[test]
+fn a_given_zero_is_placed_within_half_a_turn_whichever_turn_the_drive_counts() {
+    for turn in [-1.0, 0.0, 1.0] {
+        let motor = damiao::Motor::new(damiao::Model::J4310, 1, gains()).unwrap();
+        let mut joint = Own::new(motor).with_zero(Angle::from_radians(3.0)).unwrap();
+        let mut drive = DamiaoDrive::of(damiao::Model::J4310, 1);
+        drive.shaft_mut().set_angle(3.5 + turn * TAU);
+        for ms in 1..2_500_u64 {
+            let now = Instant::from_micros(ms * 1_000);
+            if ms == 200 || ms == 1_900 {
+                joint.arm(now).unwrap();
+            }
+            let hold = Impedance {
+                angle: Angle::from_radians(0.5),
+                stiffness: 20.0,
+                damping: 0.6,
+                ..Impedance::FREE
+            };
+            _ = joint.set_impedance(hold);
+            Devices::update(&mut joint, Tick::new(now, 0.001));
+            // Without supply for a second, after which the drive is within half a turn.
+            let is_dark = (700..1_700).contains(&ms);
+            if ms == 700 {
+                drive.lose_supply();
+            }
+            while let Some(frame) = Devices::next_frame(&mut joint, 0) {
+                if let Some(answer) = drive.hear(&frame).filter(|_| !is_dark) {
+                    assert_eq!(Devices::ingest(&mut joint, &answer, now), Ingest::Taken);
+                    let off = joint.angle(()).map_or(0.0, |angle| angle.as_radians() - 0.5);
+                    assert!(off.abs() < 0.01, "{turn}, {ms} ms: {off}");
+                }
+            }
+            drive.step(0.001);
+        }
+        assert!(Devices::is_armed(&mut joint) && joint.angle(()).is_some());
+    }
+}
+
+#[test]
+fn a_zero_is_given_to_drives_alone_that_know_their_angle() {
+    let zero = Angle::from_radians(0.3);
+    let of =
+        |motor: Result<robstride::Motor, ConfigError>| Own::new(motor.unwrap()).with_zero(zero);
+    assert!(of(robstride::Motor::new(robstride::Model::RS02, 1, gains())).is_ok());
+    let counting = of(robstride::Motor::new(robstride::Model::CYBERGEAR, 1, gains())).err();
+    assert_eq!(counting, Some(ConfigError::Unsupported("zero")));
+    let wheel = vesc::Motor::new(VESC, 23, vesc::Mode::current()).unwrap();
+    assert!(Own::new(wheel).with_zero(zero).is_err());
+    assert!(Own::new(wheel.with_encoder()).with_zero(zero).is_ok());
+    let joint = lk::Motor::new(lk::Model::MF9025_16T, 1, gains()).unwrap();
+    assert!(Own::new(joint).with_zero(zero).is_err());
+    let known = damiao::Motor::new(damiao::Model::J4310, 1, gains()).unwrap();
+    let refused = Own::new(known).with_zero(Angle::from_radians(f32::NAN)).err();
+    assert_eq!(refused, Some(ConfigError::NotFinite("zero")));
+}
+
+fn gains() -> ImpedanceControl {
+    ImpedanceControl::new(2.0).unwrap().with_gains(20.0, 0.6).unwrap()
 }

@@ -79,8 +79,9 @@ impl ImpedanceControl {
         Ok(Self { loops: Some(loops), ..self })
     }
 
-    /// Changes our own loops, also while the motor is driven: the torque goes on without a jump, as with
-    /// [`Pid::set_config`](crate::control::Pid::set_config).
+    /// Changes our own loops, also while the motor is driven. Each goes on as after
+    /// [`Pid::set_config`](crate::control::Pid::set_config): an integral carries the change of its loop, and without one the output is that of
+    /// the new gains at once.
     ///
     /// # Errors
     /// As [`with_loops`](Self::with_loops), and [`ConfigError::Unsupported`] without such loops. Nothing is changed then.

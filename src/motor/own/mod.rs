@@ -186,7 +186,7 @@ impl<M: OwnMotor> Own<M> {
     /// ```
     pub fn set_present_angle(&mut self, angle: Angle) -> Result<(), TargetError> {
         let measured = self.measured_angle().ok_or(TargetError::NoFeedback)?;
-        if !(angle.as_radians().abs() <= 1e4) {
+        if angle.as_radians().abs() > 1e4 || !angle.is_finite() {
             return Err(TargetError::NotFinite);
         }
         self.joint.zero = Zero::Found(measured - angle * self.joint.sign);

@@ -109,7 +109,8 @@ pub trait OwnMotor {
     /// Brings the loop to rest: called before the motor is driven, and on a stop.
     fn reset(&mut self);
 
-    /// Changes the loops that this crate runs, from rad to rad/s and from rad/s to Nm, also while the motor is driven.
+    /// Changes the loops that this crate runs, from rad to rad/s and from rad/s to Nm, also while the motor is driven: see
+    /// [`Own::set_loops`](super::Own::set_loops).
     ///
     /// # Errors
     /// Names the parameter without a sensible value; [`ConfigError::Unsupported`], unless said otherwise, for a motor without such loops.

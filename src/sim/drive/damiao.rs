@@ -6,7 +6,7 @@
     reason = "fields of a frame and of its registers, which saturate"
 )]
 
-use super::{Drive, DriveShaft, float, within};
+use super::{Drive, DriveShaft, float, within, wrapped};
 use crate::damiao::Model;
 use crate::frame::CanFrame;
 use embedded_can::{Frame, Id, StandardId};
@@ -125,9 +125,10 @@ impl DamiaoDrive {
         self.is_enabled = false;
     }
 
-    /// Interrupts the supply: the drive is disabled, and values written but not stored are lost.
+    /// Interrupts the supply: the drive is disabled, and its turns and values written but not stored are lost: the angle is within half a turn.
     pub fn lose_supply(&mut self) {
         self.values = self.stored;
+        self.shaft.angle_rad = wrapped(self.shaft.angle_rad);
         (self.is_enabled, self.error, self.command) = (false, 0, Command::None);
     }
 

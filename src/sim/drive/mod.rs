@@ -202,6 +202,14 @@ impl DriveShaft {
     }
 }
 
+/// Returns the angle in rad within half a turn.
+fn wrapped(angle_rad: f64) -> f64 {
+    let turns = angle_rad / core::f64::consts::TAU;
+    #[expect(clippy::cast_possible_truncation, reason = "a shaft turns less")]
+    let whole = (turns + 0.5_f64.copysign(turns)) as i64;
+    angle_rad - whole as f64 * core::f64::consts::TAU
+}
+
 /// Clamps a value to a limit and its negative; the sign of the limit does not count.
 const fn within(value: f64, limit: f64) -> f64 {
     value.min(limit.abs()).max(-limit.abs())

@@ -6,7 +6,7 @@
     reason = "fields of a frame and parameters, which saturate"
 )]
 
-use super::{Drive, DriveShaft, float, within};
+use super::{Drive, DriveShaft, float, within, wrapped};
 use crate::frame::CanFrame;
 use crate::robstride::Model;
 use embedded_can::{ExtendedId, Frame, Id};
@@ -142,10 +142,12 @@ impl RobStrideDrive {
         self.answer(21, 0, u64::from(self.faults).to_le_bytes())
     }
 
-    /// Interrupts the supply: the drive is disabled and in operation mode, and values written but not stored are lost.
+    /// Interrupts the supply: the drive is disabled and in operation mode, and values written but not stored are lost. The angle is within half a
+    /// turn then, as with `zero_sta` 1; that of a CyberGear is 0.
     pub fn lose_supply(&mut self) {
         self.values = self.stored;
         self.write(0x7005, 0.0);
+        self.shaft.angle_rad = if self.is_cybergear { 0.0 } else { wrapped(self.shaft.angle_rad) };
         (self.is_enabled, self.faults, self.operation) = (false, 0, [0.0; 5]);
     }
 
