@@ -232,8 +232,8 @@ impl Tachometer {
         Self { last: 0, turns: 0, phase: 0, turn, output }
     }
 
-    /// Takes a count of the drive, which wraps, and returns its change. After a restart of the drive the angle begins at its new zero.
-    pub(crate) fn take(&mut self, count: i32) -> i32 {
+    /// Takes a count of the drive, which wraps. After a restart of the drive the angle begins at its new zero.
+    pub(crate) fn take(&mut self, count: i32) {
         let way = count.wrapping_sub(self.last);
         self.last = count;
         // Whole runs of the gear's fraction leave the phase alone.
@@ -243,7 +243,6 @@ impl Tachometer {
         self.turns += i64::from(runs) * i64::from(self.output);
         self.turns += i64::from(sum.checked_div_euclid(self.turn).unwrap_or_default());
         self.phase = sum.checked_rem_euclid(self.turn).unwrap_or_default();
-        way
     }
 
     /// Returns the position since the drive has started.

@@ -90,15 +90,13 @@ impl Guard {
     }
 
     /// Returns the time since the last feedback in µs; `None` before the first.
-    pub(super) fn gap_us(&self, now: Instant) -> Option<u32> {
+    pub(crate) fn gap_us(&self, now: Instant) -> Option<u32> {
         let is_heard = self.motor.link() != Link::Unheard;
         is_heard.then(|| age(now.stamp(), self.motor.heard()))
     }
 
-    /// Tells whether a silence ends now in which a drive may have started again: of 100 ms, or more where feedback is late only after more.
-    pub(super) fn ends_silence(&self, now: Instant) -> bool {
-        let silence_us = self.device.timeouts().late_us().max(100_000);
-        self.gap_us(now).is_some_and(|gap| gap >= silence_us)
+    pub(super) const fn late_us(&self) -> u32 {
+        self.device.timeouts().late_us()
     }
 
     fn forget_bygones(&mut self, before: Instant, now: Instant) {

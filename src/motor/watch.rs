@@ -55,8 +55,8 @@ impl Watch {
 
     /// Counts feedback before the guard takes its time.
     #[inline]
-    pub(crate) fn hear(&mut self, guard: &Guard, now: Instant) {
-        match guard.gap_us(now) {
+    pub(crate) fn hear(&mut self, gap_us: Option<u32>, now: Instant) {
+        match gap_us {
             Some(gap_us) => self.traffic.gap(gap_us),
             None => self.window_from = now,
         }

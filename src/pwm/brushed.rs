@@ -147,7 +147,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
             self.counted = Some((before, then));
             self.counts = self.counts.wrapping_sub(moved);
         }
-        self.watch.hear(&self.guard, now);
+        self.watch.hear(self.guard.gap_us(now), now);
         self.guard.hear(now);
     }
 

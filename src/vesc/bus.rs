@@ -9,8 +9,8 @@ use crate::encoder::Tachometer;
 use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::{
-    Capabilities, Capability, Claim, Ingest, Malformed, MotorName, Order, OwnMotor, Role, Severity,
-    Vitals, WrongSetting,
+    Capabilities, Capability, Claim, Ingest, Malformed, MotorName, Order, OwnMotor, Role, Vitals,
+    WrongSetting,
 };
 use crate::units::{Angle, AngularVelocity};
 use embedded_can::{Frame, Id};
@@ -65,8 +65,6 @@ pub struct Motor {
     has_fault_code: bool,
     feedback: Feedback,
     tachometer: Tachometer,
-    /// The count of the tachometer went further than the shaft can have turned: the drive has begun anew.
-    has_restarted: bool,
     /// Frames with the motion since the last one with the angle.
     angle_age: u8,
     /// Commands since the last question for the fault code.
@@ -95,7 +93,6 @@ impl Motor {
             has_encoder: mode.has_position(),
             has_fault_code: true,
             feedback: Feedback::default(),
-            has_restarted: false,
             angle_age: u8::MAX,
             orders: 0,
             unanswered: 0,
@@ -168,10 +165,7 @@ impl Motor {
         if packet == MOTION {
             self.angle_age = self.angle_age.saturating_add(1);
         } else if packet == TACHOMETER {
-            let way = self.tachometer.take(self.feedback.tachometer.unwrap_or_default());
-            let most = 3.0 + 0.003 * self.feedback.erpm.unwrap_or_default().unsigned_abs() as f32;
-            let is_counted = self.mode.needs_angle() && self.has_fresh_angle();
-            self.has_restarted |= is_counted && way.unsigned_abs() as f32 > most;
+            self.tachometer.take(self.feedback.tachometer.unwrap_or_default());
         }
         if packet == if self.has_encoder { TEMPERATURES } else { TACHOMETER } {
             self.angle_age = 0;
@@ -247,7 +241,7 @@ impl OwnMotor for Motor {
 
     fn reset(&mut self) {
         self.mode.reset();
-        (self.effort, self.has_restarted) = (Some(0.0), false);
+        self.effort = Some(0.0);
     }
 
     fn set_loops(&mut self, position: PidConfig, speed: PidConfig) -> Result<(), ConfigError> {
@@ -255,7 +249,6 @@ impl OwnMotor for Motor {
     }
 
     fn inquire(&mut self) -> Option<CanFrame> {
-        self.has_restarted = false;
         self.has_fault_code.then(|| self.ask())
     }
 
@@ -303,14 +296,12 @@ impl OwnMotor for Motor {
             _ => None,
         };
         let current = drive.current_a.unwrap_or_default() / self.model.current_limit_a;
-        let vitals = Vitals::of_errors([drive.fault.unwrap_or_default()], 0);
         Vitals {
-            error: if self.has_restarted { Some(Severity::Fault) } else { vitals.error },
             temperature_c: celsius,
             effort: self.effort.unwrap_or(current),
             speed: self.velocity().as_rad_per_s() / self.model.max_velocity.as_rad_per_s(),
             current,
-            ..vitals
+            ..Vitals::of_errors([drive.fault.unwrap_or_default()], 0)
         }
     }
 }

@@ -488,9 +488,11 @@ fn drive_error(family: &Family) -> String {
     format!("{}; {again}", after(longest))
 }
 
-/// In the position mode of the drive, and no farther in any other mode with an angle.
+/// In the position mode of the drive, and no farther in any other mode with an angle: but for a VESC, whose tachometer begins at 0 without a
+/// word, and which is silent for longer when it starts.
 fn forgets_its_turns(family: &Family) -> String {
-    for (_, make) in family.modes.iter().filter(|(mode, _)| mode.contains("angle")) {
+    let has_angle = |mode: &str| mode.contains("angle") && family.name != "vesc";
+    for (_, make) in family.modes.iter().filter(|(mode, _)| has_angle(mode)) {
         forgets_its_turns_in(make());
     }
     forgets_its_turns_in(family.at_position())

@@ -714,26 +714,3 @@ fn targets_between_a_loss_and_the_first_feedback_send_nothing() {
         assert!(bench.own.set_angle((), Angle::from_radians(-3.0)).is_err());
     });
 }
-
-/// The program does not see the restart as a silence: it stood still itself, or the drive was quick.
-#[test]
-fn a_count_of_turns_that_jumps_trips_the_motor() {
-    let position = PidConfig::new(10.0, 0.0, 0.0).with_output_limit(20.0);
-    let speed = PidConfig::new(0.3, 1.0, 0.0);
-    let mode = Mode::current_with_loops(position, speed).unwrap();
-    for pause_us in [0, 300_000] {
-        let mut bench = Bench::armed(mode);
-        let held = |bench: &mut Bench| {
-            _ = bench.own.set_angle((), Angle::from_radians(1.6));
-        };
-        bench.steps(1_000, held);
-        let here = bench.drive.shaft().angle_rad();
-        bench.drive.lose_supply();
-        bench.now_us += pause_us;
-        bench.steps(300, held);
-        assert!(!Devices::is_armed(&mut bench.own), "{pause_us} us");
-        let moved = (bench.drive.shaft().angle_rad() - here).abs();
-        assert!(here > 1.4 && moved < 0.1, "{pause_us} us: {moved} rad from {here} rad");
-        assert_eq!(bench.own.arm(bench.now()), Ok(()), "{pause_us} us: a gesture");
-    }
-}

@@ -18,11 +18,11 @@ pub(super) enum Zero {
     OfDrive,
     /// Given with the configuration, within a turn: whole turns are not known before the joint was heard.
     Given(Angle),
-    /// The same, in the turn where the joint was heard first.
+    /// Of a drive that knows its angle within a turn: whole turns follow the joint over a loss of the supply.
     Placed(Angle),
-    /// Set while the drive was on.
+    /// Of a drive that counts from where it was switched on.
     Found(Angle),
-    /// Found, and the drive may have lost its supply since, so its angle is another.
+    /// The drive may have lost its supply since.
     Lost,
 }
 
@@ -30,20 +30,16 @@ impl Joint {
     /// The joint turns and counts as its drive.
     pub(super) const DIRECT: Self = Self { sign: 1.0, zero: Zero::OfDrive };
 
-    /// The drive may have lost its supply. A drive that knows its angle does not know its turns.
-    pub(super) const fn doubt_zero(&mut self) {
-        self.zero = match self.zero {
-            Zero::OfDrive => Zero::OfDrive,
-            Zero::Given(zero) | Zero::Placed(zero) => Zero::Given(zero),
-            Zero::Found(_) | Zero::Lost => Zero::Lost,
+    /// The drive may have lost its supply between two angles, in which the joint turned by less than half a turn.
+    pub(super) fn doubt_zero(&mut self, before: Option<Angle>, after: Option<Angle>) {
+        self.zero = match (self.zero, before, after) {
+            (Zero::Placed(zero), Some(before), Some(after)) => {
+                let way = after - before;
+                Zero::Placed(zero + way - way.wrapped())
+            }
+            (Zero::Placed(_) | Zero::Found(_), ..) => Zero::Lost,
+            (zero, ..) => zero,
         };
-    }
-
-    /// Places a given zero within half a turn of the angle of the drive.
-    pub(super) fn place_zero(&mut self, measured: Angle) {
-        if let Zero::Given(zero) = self.zero {
-            self.zero = Zero::Placed(measured - (measured - zero).wrapped());
-        }
     }
 
     const fn zero(&self) -> Option<Angle> {

@@ -38,6 +38,8 @@ use route::{Offered, Route};
 
 /// The most frames a second for the power of a drive, each beside a command or rest.
 const POWER_HZ: u32 = 100;
+/// After a silence of so long a drive may have started again, in µs.
+const SILENCE_US: u32 = 100_000;
 /// The time between two questions for a setting.
 const INQUIRY: Duration = Duration::from_millis(10);
 
@@ -146,8 +148,8 @@ impl<M: OwnMotor> Own<M> {
         self
     }
 
-    /// Takes the angle of the drive at which the joint is at zero, by a calibration. Whole turns are lost with the supply, so the joint
-    /// is within half a turn of its zero when it is heard first, and again after it was offline or has reset.
+    /// Takes the angle of the drive at which the joint is at zero, by a calibration. No drive keeps its turns without supply: the joint is
+    /// within half a turn of its zero when it is heard first, and turns by less than half a turn while its drive has no supply.
     ///
     /// # Errors
     /// [`ConfigError::NotFinite`]; [`ConfigError::Unsupported`] for a drive without [`Capability::AbsoluteAngle`].
@@ -162,8 +164,9 @@ impl<M: OwnMotor> Own<M> {
 
     /// Makes the present angle of the joint so much; the shaft follows its target as before.
     ///
-    /// A drive that lost its supply counts from another angle, or in another turn. Once a drive was silent for 100 ms or has reset, the joint
-    /// has no angle, and targets with an angle are refused as [`TargetError::NotHomed`], until this is called again.
+    /// A drive without [`Capability::AbsoluteAngle`] counts from another angle when it has lost its supply. Once such a drive was silent for
+    /// 100 ms or has reset, the joint has no angle, and targets with an angle are refused as [`TargetError::NotHomed`], until this is called
+    /// again. A joint that was never given a zero counts as its drive, and has none to lose.
     ///
     /// # Errors
     /// [`TargetError::NoFeedback`] without fresh feedback with an angle, [`TargetError::NotFinite`] for an angle beyond 10 000 rad.
@@ -189,7 +192,9 @@ impl<M: OwnMotor> Own<M> {
         if angle.as_radians().abs() > 1e4 || !angle.is_finite() {
             return Err(TargetError::NotFinite);
         }
-        self.joint.zero = Zero::Found(measured - angle * self.joint.sign);
+        let zero = measured - angle * self.joint.sign;
+        let is_absolute = self.motor.capabilities().has(Capability::AbsoluteAngle);
+        self.joint.zero = if is_absolute { Zero::Placed(zero) } else { Zero::Found(zero) };
         Ok(())
     }
 
@@ -296,17 +301,19 @@ impl<M: OwnMotor> Own<M> {
         if self.motor.decode_answer(frame) {
             return Ingest::Taken;
         }
+        let before = match self.joint.zero {
+            Zero::Placed(_) => self.motor.angle(),
+            _ => None,
+        };
         let outcome = self.motor.decode(frame);
         if outcome == Ingest::Taken {
-            if self.guard.ends_silence(now) {
-                self.doubt_supply();
+            let gap_us = self.guard.gap_us(now);
+            if gap_us.is_some_and(|gap_us| gap_us >= SILENCE_US) {
+                self.end_silence(gap_us, before);
             }
-            if let (Zero::Given(_), Some(measured)) = (self.joint.zero, self.motor.angle()) {
-                self.joint.place_zero(measured);
-            }
-            self.watch.hear(&self.guard, now);
+            self.watch.hear(gap_us, now);
             self.guard.hear(now);
-            self.hear_power(now);
+            self.hear_power(now, before);
         }
         outcome
     }
@@ -337,10 +344,14 @@ impl<M: OwnMotor> Own<M> {
     }
 
     /// Takes the drive's report of its power.
-    fn hear_power(&mut self, now: Instant) {
+    fn hear_power(&mut self, now: Instant, before: Option<Angle>) {
         if self.power.hear(self.motor.is_enabled(), now) {
             self.fail(now);
-            self.doubt_supply();
+            self.motor.forget_settings();
+            // A drive that knows its error has kept its supply.
+            if self.motor.vitals().error.is_none() {
+                self.doubt_supply(before);
+            }
         }
     }
 
@@ -351,10 +362,25 @@ impl<M: OwnMotor> Own<M> {
         self.guard.relax_until_armed();
     }
 
+    /// Ends a silence in which the drive may have started again, unless feedback is late only after more.
+    #[cold]
+    fn end_silence(&mut self, gap_us: Option<u32>, before: Option<Angle>) {
+        if gap_us >= Some(self.guard.late_us()) {
+            self.doubt_supply(before);
+        }
+    }
+
+    /// Places a given zero in the turn where the joint is heard first.
+    fn place_zero(&mut self) {
+        if let (Zero::Given(zero), Some(measured)) = (self.joint.zero, self.measured_angle()) {
+            self.joint.zero = Zero::Placed(measured - (measured - zero).wrapped());
+        }
+    }
+
     /// The drive may have lost its supply.
     #[cold]
-    fn doubt_supply(&mut self) {
+    fn doubt_supply(&mut self, before: Option<Angle>) {
         self.motor.forget_settings();
-        self.joint.doubt_zero();
+        self.joint.doubt_zero(before, self.motor.angle());
     }
 }
