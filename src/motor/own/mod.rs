@@ -164,8 +164,8 @@ impl<M: OwnMotor> Own<M> {
 
     /// Makes the present angle of the joint so much; the shaft follows its target as before.
     ///
-    /// A drive without [`Capability::AbsoluteAngle`] counts from another angle when it has lost its supply. Once such a drive was silent for
-    /// 100 ms or has reset, the joint has no angle, and targets with an angle are refused as [`TargetError::NotHomed`], until this is called
+    /// A drive without [`Capability::AbsoluteAngle`] counts from another angle when it has lost its supply. Once no feedback was taken for
+    /// 100 ms, or for longer where it is late only then, the joint has no angle, and targets with an angle are refused as [`TargetError::NotHomed`], until this is called
     /// again. A joint that was never given a zero counts as its drive, and has none to lose.
     ///
     /// # Errors
@@ -301,21 +301,43 @@ impl<M: OwnMotor> Own<M> {
         if self.motor.decode_answer(frame) {
             return Ingest::Taken;
         }
-        let before = match self.joint.zero {
-            Zero::Placed(_) => self.motor.angle(),
-            _ => None,
-        };
+        let gap_us = self.guard.gap_us(now);
+        if gap_us.is_some_and(|gap_us| gap_us > SILENCE_US) {
+            return self.take_after_silence(frame, gap_us, now);
+        }
         let outcome = self.motor.decode(frame);
         if outcome == Ingest::Taken {
-            let gap_us = self.guard.gap_us(now);
-            if gap_us.is_some_and(|gap_us| gap_us >= SILENCE_US) {
-                self.end_silence(gap_us, before);
-            }
-            self.watch.hear(gap_us, now);
-            self.guard.hear(now);
-            self.hear_power(now, before);
+            self.hear(gap_us, now);
         }
         outcome
+    }
+
+    /// Takes feedback after a silence in which the drive may have started again, unless feedback is late only after more.
+    #[cold]
+    #[inline(never)]
+    fn take_after_silence(
+        &mut self,
+        frame: &CanFrame,
+        gap_us: Option<u32>,
+        now: Instant,
+    ) -> Ingest {
+        let before = self.motor.angle();
+        let outcome = self.motor.decode(frame);
+        if outcome == Ingest::Taken {
+            if gap_us > Some(self.guard.late_us()) {
+                self.motor.forget_settings();
+                self.joint.doubt_zero(before, self.motor.angle());
+            }
+            self.hear(gap_us, now);
+        }
+        outcome
+    }
+
+    #[inline(always)]
+    fn hear(&mut self, gap_us: Option<u32>, now: Instant) {
+        self.watch.hear(gap_us, now);
+        self.guard.hear(now);
+        self.hear_power(now);
     }
 
     #[inline(never)]
@@ -344,14 +366,10 @@ impl<M: OwnMotor> Own<M> {
     }
 
     /// Takes the drive's report of its power.
-    fn hear_power(&mut self, now: Instant, before: Option<Angle>) {
+    fn hear_power(&mut self, now: Instant) {
         if self.power.hear(self.motor.is_enabled(), now) {
             self.fail(now);
             self.motor.forget_settings();
-            // A drive that knows its error has kept its supply.
-            if self.motor.vitals().error.is_none() {
-                self.doubt_supply(before);
-            }
         }
     }
 
@@ -362,25 +380,10 @@ impl<M: OwnMotor> Own<M> {
         self.guard.relax_until_armed();
     }
 
-    /// Ends a silence in which the drive may have started again, unless feedback is late only after more.
-    #[cold]
-    fn end_silence(&mut self, gap_us: Option<u32>, before: Option<Angle>) {
-        if gap_us >= Some(self.guard.late_us()) {
-            self.doubt_supply(before);
-        }
-    }
-
     /// Places a given zero in the turn where the joint is heard first.
     fn place_zero(&mut self) {
         if let (Zero::Given(zero), Some(measured)) = (self.joint.zero, self.measured_angle()) {
             self.joint.zero = Zero::Placed(measured - (measured - zero).wrapped());
         }
-    }
-
-    /// The drive may have lost its supply.
-    #[cold]
-    fn doubt_supply(&mut self, before: Option<Angle>) {
-        self.motor.forget_settings();
-        self.joint.doubt_zero(before, self.motor.angle());
     }
 }

@@ -353,7 +353,7 @@ impl<S: Subject> Run<S> {
             let own = self.is_command(&frame);
             self.expect(own, Rule::SendsWhatItClaims)?;
             output.driving += u32::from(!self.subject.is_zero(&frame));
-            output.effort = output.effort.max(self.subject.effort(&frame).map_or(0.0, f32::abs));
+            output.effort = output.effort.max(self.effort(&frame));
             output.last = Some(frame);
             let bytes = frame.header().to_be_bytes().into_iter().chain(*frame.bytes());
             // FNV-1a.
@@ -362,6 +362,12 @@ impl<S: Subject> Run<S> {
             }) ^ 0xCBF2_9CE4_8422_2325;
         }
         Ok(output)
+    }
+
+    /// Returns the size of the effort: 0 if not known, and endless for a number that is none.
+    fn effort(&self, frame: &CanFrame) -> f32 {
+        let effort = self.subject.effort(frame).unwrap_or(0.0).abs();
+        if effort.is_nan() { f32::INFINITY } else { effort }
     }
 
     fn is_command(&mut self, frame: &CanFrame) -> bool {

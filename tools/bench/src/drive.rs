@@ -146,7 +146,6 @@ impl Drive {
     }
 }
 
-/// The registers of Damiao, by their names.
 /// Finds a register by its name in the crate or in the manual of the drive.
 fn found<R: Copy + std::fmt::Debug>(
     registers: &[R],
