@@ -90,13 +90,14 @@ impl Guard {
     }
 
     /// Returns the time since the last feedback in µs; `None` before the first.
+    #[inline]
     pub(crate) fn gap_us(&self, now: Instant) -> Option<u32> {
         let is_heard = self.motor.link() != Link::Unheard;
         is_heard.then(|| age(now.stamp(), self.motor.heard()))
     }
 
-    pub(super) const fn late_us(&self) -> u32 {
-        self.device.timeouts().late_us()
+    pub(super) const fn is_late_by(&self, gap_us: u32) -> bool {
+        gap_us > self.device.timeouts().late_us()
     }
 
     fn forget_bygones(&mut self, before: Instant, now: Instant) {

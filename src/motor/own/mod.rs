@@ -324,7 +324,7 @@ impl<M: OwnMotor> Own<M> {
         let before = self.motor.angle();
         let outcome = self.motor.decode(frame);
         if outcome == Ingest::Taken {
-            if gap_us > Some(self.guard.late_us()) {
+            if gap_us.is_some_and(|gap_us| self.guard.is_late_by(gap_us)) {
                 self.motor.forget_settings();
                 self.joint.doubt_zero(before, self.motor.angle());
             }
