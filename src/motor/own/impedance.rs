@@ -14,7 +14,7 @@ use crate::units::{Angle, AngularVelocity};
 /// then the damper, so far from its target a joint turns at most at the limit divided by the damping. Angle and velocity are sent
 /// near enough for gains times the remaining way to keep within the limit. Until the next command the drive follows its own
 /// measurements: a shaft blocked while turning at `v` feels up to `damping * v` more.
-/// At the end of the velocity's range, where the drive may turn faster than it reports, spring and damper are sent as a torque alone.
+/// At the end of the velocity's range, where the drive may turn faster than it reports, a damper and its spring are sent as a torque alone.
 /// Stiffness and damping are scaled by the [share](Order::share) of the order, and lowered where a count of the angle or of the
 /// velocity, times the gain, is more than an eighth of the limit.
 ///
@@ -25,7 +25,8 @@ use crate::units::{Angle, AngularVelocity};
 /// use drivetrain::units::{Angle, AngularVelocity};
 ///
 /// let mut joint = ImpedanceControl::new(3.0)?.with_gains(20.0, 0.6)?; // Nm, Nm/rad, Nm s/rad
-/// let most = Impedance { angle: Angle::from_radians(12.5), stiffness: 500.0, damping: 5.0, ..Impedance::FREE };
+/// let fastest = AngularVelocity::from_rad_per_s(30.0);
+/// let most = Impedance { angle: Angle::from_radians(12.5), velocity: fastest, stiffness: 500.0, damping: 5.0, torque_nm: 10.0 };
 /// let count = Impedance { stiffness: 500.0 / 4095.0, damping: 5.0 / 4095.0, ..Impedance::FREE };
 /// let order = Order { target: Target::Angle(Angle::from_radians(1.0)), share: 1.0, step: TimeStep::of(0.001) };
 /// let sent = joint.step(order, Some(Angle::ZERO), AngularVelocity::ZERO, &most, &count).ok_or("at rest")?;
@@ -170,7 +171,7 @@ impl ImpedanceControl {
         let end = most.velocity.as_rad_per_s();
         let change = limited(wanted.velocity.as_rad_per_s(), -end, end) - velocity.as_rad_per_s();
         // A velocity at the end of its range is there or beyond: a damper of the drive could pass the limit, a torque cannot.
-        if velocity.as_rad_per_s().abs() >= end - 0.5 * per_count_s {
+        if damping > 0.0 && velocity.as_rad_per_s().abs() >= end - 0.5 * per_count_s {
             let sum = torque_nm + stiffness * way + damping * change;
             let torque_nm = limited(sum, -limit, limit);
             self.effort = torque_nm / self.torque_limit_nm;

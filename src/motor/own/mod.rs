@@ -175,13 +175,14 @@ impl<M: OwnMotor> Own<M> {
     /// ```
     /// use drivetrain::damiao::{Model, Motor};
     /// use drivetrain::frame::CanFrame;
-    /// use drivetrain::motor::{AngleDrive, CanDevice, ImpedanceControl, Own};
+    /// use drivetrain::motor::{AngleDrive, CanDevice, ImpedanceControl, Ingest, Own};
     /// use drivetrain::time::Instant;
     /// use drivetrain::units::Angle;
     ///
     /// let mut knee = Own::new(Motor::new(Model::J4310, 1, ImpedanceControl::new(3.0)?)?).reversed();
     /// let feedback = [0x11, 0x94, 0x7A, 0x7F, 0xF7, 0xFF, 30, 35]; // 2 rad of 12.5
-    /// knee.ingest(&CanFrame::standard(0x011, feedback), Instant::from_micros(1_000));
+    /// let feedback = CanFrame::standard(0x011, feedback).ok_or("id")?;
+    /// assert_eq!(knee.ingest(&feedback, Instant::from_micros(1_000)), Ingest::Taken);
     /// assert!((knee.angle(()).ok_or("no angle")?.as_radians() + 2.0).abs() < 1e-3);
     /// knee.set_present_angle(Angle::from_radians(0.5))?;
     /// assert!((knee.angle(()).ok_or("no angle")?.as_radians() - 0.5).abs() < 1e-3);
