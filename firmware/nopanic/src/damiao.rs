@@ -22,9 +22,11 @@ pub fn call_all() {
     Status::is_error.call();
     Status::error_code.call();
     Register::number.call();
+    Register::manual.call();
     Register::is_float.call();
     Register::is_writable.call();
     ImpedanceControl::new.call();
+    ImpedanceControl::set_loops.call();
     ImpedanceControl::with_gains.call();
     ImpedanceControl::with_loops.call();
     ImpedanceControl::torque_limit_nm.call();

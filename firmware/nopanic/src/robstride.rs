@@ -24,6 +24,7 @@ pub fn call_all() {
     Feedback::angle.call();
     Feedback::fault_code.call();
     Register::index.call();
+    Register::manual.call();
     Register::is_float.call();
     Register::is_writable.call();
     settings();
