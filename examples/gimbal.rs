@@ -1,4 +1,4 @@
-//! A gimbal that looks one way while its chassis swings and spins under it: the outer loop runs on an IMU.
+//! A gimbal keeps its direction while the chassis swings and spins: the outer loop runs on an IMU.
 //!
 //! ```text
 //! cargo run --release --example gimbal [--fault dead-imu] [FILE.svg]

@@ -48,7 +48,7 @@ pub(crate) struct Sample {
     pub(crate) capacitor_j: f32,
 }
 
-/// What can be taken from the robot on its way.
+/// The parts that fail on the way.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Lost {
     /// The cable of the referee system, from 6 s on.

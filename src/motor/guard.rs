@@ -10,7 +10,7 @@ use crate::time::{Duration, Edge, Instant};
 ///
 /// * Before arming, the output is zero. After a trip, a request to arm counts only after 100 ms without a request.
 /// * Late or lost feedback, and a target that is old, NaN or infinite, give zero.
-/// * An update that does not lie after the previous one gives zero in that cycle, and trips.
+/// * An update without a later time than the update before gives zero in that cycle, and trips.
 /// * The output range [opens](Self::share) from zero after arming.
 /// * An emergency stop stays until cleared; the motor must then be armed again.
 ///

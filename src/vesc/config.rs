@@ -176,7 +176,7 @@ impl Mode {
 
     /// Position control by the drive's own loop, which needs an encoder.
     ///
-    /// Status 4 has the angle, of the output shaft if the position angle division in VESC Tool is the gear ratio.
+    /// Status 4 has the angle. The angle is of the output shaft if the position angle division in VESC Tool is the gear ratio.
     #[must_use]
     pub const fn position() -> Self {
         Self(Kind::Position)

@@ -303,7 +303,7 @@ impl<M: OwnMotor> Own<M> {
             return Ingest::Taken;
         }
         let gap_us = self.guard.gap_us(now);
-        if gap_us.is_some_and(|gap_us| gap_us > SILENCE_US) {
+        if let Some(gap_us) = gap_us.filter(|gap_us| *gap_us > SILENCE_US) {
             return self.take_after_silence(frame, gap_us, now);
         }
         let outcome = self.motor.decode(frame);
@@ -316,20 +316,15 @@ impl<M: OwnMotor> Own<M> {
     /// Takes feedback after a silence in which the drive may have started again, unless feedback is late only after more.
     #[cold]
     #[inline(never)]
-    fn take_after_silence(
-        &mut self,
-        frame: &CanFrame,
-        gap_us: Option<u32>,
-        now: Instant,
-    ) -> Ingest {
+    fn take_after_silence(&mut self, frame: &CanFrame, gap_us: u32, now: Instant) -> Ingest {
         let before = self.motor.angle();
         let outcome = self.motor.decode(frame);
         if outcome == Ingest::Taken {
-            if gap_us.is_some_and(|gap_us| self.guard.is_late_by(gap_us)) {
+            if self.guard.is_late_by(gap_us) {
                 self.motor.forget_settings();
                 self.joint.doubt_zero(before, self.motor.angle());
             }
-            self.hear(gap_us, now);
+            self.hear(Some(gap_us), now);
         }
         outcome
     }

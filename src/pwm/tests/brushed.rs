@@ -172,7 +172,7 @@ fn a_pin_that_fails_is_named_and_tried_again() {
     assert_eq!(motor.update(tick(3)), Err(BrushedError::Pwm(Broken)));
 }
 
-/// What a pin was set to last.
+/// The last level of a pin.
 fn level(log: &Log, pin: &str) -> u16 {
     log.events.borrow().iter().rev().find(|(name, _)| *name == pin).unwrap().1
 }

@@ -131,7 +131,7 @@ pub enum Rule {
     UnsupportedIsAnError,
     /// A second bad time step in a row gives zero.
     BadStepsAreZero,
-    /// An update that does not lie after the one before gives zero in that cycle, and until the device is armed again.
+    /// An update without a later time than the update before gives zero in that cycle, and until the device is armed again.
     LostTimeTrips,
     /// After a trip, a request to arm repeated in each tick is never granted, and a request after a pause is.
     ArmingIsAGesture,

@@ -9,6 +9,7 @@
 use super::{Drive, DriveShaft, float, within, wrapped};
 use crate::damiao::Model;
 use crate::frame::CanFrame;
+use core::f64::consts::PI;
 use embedded_can::{Frame, Id, StandardId};
 
 const ENABLE: u64 = 0xFFFF_FFFF_FFFF_FFFC;
@@ -128,7 +129,7 @@ impl DamiaoDrive {
     /// Interrupts the supply: the drive is disabled, and its turns and values written but not stored are lost: the angle is within half a turn.
     pub fn lose_supply(&mut self) {
         self.values = self.stored;
-        self.shaft.angle_rad = wrapped(self.shaft.angle_rad);
+        self.shaft.angle_rad = wrapped(self.shaft.angle_rad, PI);
         (self.is_enabled, self.error, self.command) = (false, 0, Command::None);
     }
 

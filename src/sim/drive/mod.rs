@@ -202,12 +202,10 @@ impl DriveShaft {
     }
 }
 
-/// Returns the angle in rad within half a turn.
-fn wrapped(angle_rad: f64) -> f64 {
-    let turns = angle_rad / core::f64::consts::TAU;
-    #[expect(clippy::cast_possible_truncation, reason = "a shaft turns less")]
-    let whole = (turns + 0.5_f64.copysign(turns)) as i64;
-    angle_rad - whole as f64 * core::f64::consts::TAU
+/// Returns the value within its range around zero, at whose end it begins again at the other. The shaft stays within billions of turns.
+fn wrapped(value: f64, range: f64) -> f64 {
+    let rest = (value + range) % (2.0 * range);
+    (if rest < 0.0 { rest + 2.0 * range } else { rest }) - range
 }
 
 /// Clamps a value to a limit and its negative; the sign of the limit does not count.
@@ -268,20 +266,21 @@ mod tests {
 
     const MS: Duration = Duration::from_millis(1);
 
+    const VESC: VescMotor = VescMotor {
+        pole_pairs: 7,
+        gear: 1.0,
+        torque_constant_nm_per_a: 0.05,
+        current_max_a: 40.0,
+        no_load_rad_per_s: 600.0,
+    };
+
     #[test]
     fn drives_of_six_families_on_two_buses_answer_the_controller_and_nobody_else() {
-        let motor = VescMotor {
-            pole_pairs: 7,
-            gear: 1.0,
-            torque_constant_nm_per_a: 0.05,
-            current_max_a: 40.0,
-            no_load_rad_per_s: 600.0,
-        };
         let mut damiao = DamiaoDrive::of(damiao::Model::J4310, 1);
         let mut lk = LkDrive::of(lk::Model::MF9025_16T, 1);
         let mut rmd = RmdDrive::new(2, 2.4);
         let mut robstride = RobStrideDrive::of(robstride::Model::RS02, 1);
-        let mut vesc = VescDrive::new(23, motor);
+        let mut vesc = VescDrive::new(23, VESC);
         let mut odrive = OdriveDrive::new(3, true, 0.05, 1.0).with_periods(0.0, 0.0);
 
         let enable_damiao = standard(1, [0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFC]);
@@ -296,45 +295,41 @@ mod tests {
             (Line::Can2, CanFrame::new_remote(StandardId::new(0x069).unwrap(), 8).unwrap(), 0x069),
         ];
         let world = Simulation::new(1);
-        let advance = |drives: &mut [(Line, &mut dyn Drive)]| {
+        let mut advance = || {
+            let drives: &mut [(Line, &mut dyn Drive)] = &mut [
+                (Line::Can1, &mut damiao),
+                (Line::Can1, &mut lk),
+                (Line::Can1, &mut rmd),
+                (Line::Can2, &mut robstride),
+                (Line::Can2, &mut vesc),
+                (Line::Can2, &mut odrive),
+            ];
             world.advance_drives(Duration::from_millis(20), drives).unwrap();
-            [Line::Can1, Line::Can2].map(|line| {
+            let heard = [Line::Can1, Line::Can2].map(|line| {
                 let mut controller = world.controller_on(line);
                 let mut heard: Vec<CanFrame> =
                     iter::from_fn(|| controller.receive().ok()).collect();
                 heard.sort_by_key(|frame| frame.header() & 0x1FFF_FFFF);
                 heard
-            })
+            });
+            let are_enabled = [damiao.is_enabled(), robstride.is_enabled()];
+            (heard, are_enabled, [lk.shaft().torque_nm(), rmd.shaft().torque_nm()])
         };
         // A foreign node is heard by the controller, and its commands by no drive.
         for (line, command, _) in commands {
             world.inject(line, command).unwrap();
         }
-        let heard = advance(&mut [
-            (Line::Can1, &mut damiao),
-            (Line::Can1, &mut lk),
-            (Line::Can1, &mut rmd),
-            (Line::Can2, &mut robstride),
-            (Line::Can2, &mut vesc),
-            (Line::Can2, &mut odrive),
-        ]);
+        let (heard, are_enabled, torques_nm) = advance();
         let injected = commands.map(|(_, command, _)| command);
         assert!(heard.iter().flatten().all(|frame| injected.contains(frame)), "{heard:?}");
         assert_eq!([3, 3], heard.map(|frames| frames.len()));
-        assert!(!damiao.is_enabled() && !robstride.is_enabled());
-        assert!(lk.shaft().torque_nm() == 0.0 && rmd.shaft().torque_nm() == 0.0);
+        assert_eq!(are_enabled, [false; 2]);
+        assert!(torques_nm.iter().all(|torque_nm| *torque_nm == 0.0));
 
         for (line, command, _) in commands {
             world.controller_on(line).transmit(&command).unwrap();
         }
-        let heard = advance(&mut [
-            (Line::Can1, &mut damiao),
-            (Line::Can1, &mut lk),
-            (Line::Can1, &mut rmd),
-            (Line::Can2, &mut robstride),
-            (Line::Can2, &mut vesc),
-            (Line::Can2, &mut odrive),
-        ]);
+        let (heard, are_enabled, [lk_nm, rmd_nm]) = advance();
         for (line, heard) in [Line::Can1, Line::Can2].into_iter().zip(heard) {
             let ids: Vec<u32> = heard.iter().map(|frame| frame.header() & 0x1FFF_FFFF).collect();
             let answers = commands.iter().filter(|(on, ..)| *on == line).map(|(.., id)| *id);
@@ -343,9 +338,9 @@ mod tests {
             // Three frames of the foreign node, three commands, three answers: the drive of LK did not answer its own answer.
             assert_eq!(world.traffic(line).frames, 9);
         }
-        assert!(damiao.is_enabled() && robstride.is_enabled());
-        assert!((lk.shaft().torque_nm() - 100.0 * 33.0 / 4096.0 * 0.32).abs() < 1e-5);
-        assert!((rmd.shaft().torque_nm() - 2.4).abs() < 1e-5);
+        assert_eq!(are_enabled, [true; 2]);
+        assert!((lk_nm - 100.0 * 33.0 / 4096.0 * 0.32).abs() < 1e-5);
+        assert!((rmd_nm - 2.4).abs() < 1e-5);
     }
 
     #[test]
@@ -397,15 +392,8 @@ mod tests {
 
     #[test]
     fn a_vesc_sends_its_status_frames_at_a_rate_and_none_at_delivery() {
-        let motor = VescMotor {
-            pole_pairs: 7,
-            gear: 1.0,
-            torque_constant_nm_per_a: 0.05,
-            current_max_a: 40.0,
-            no_load_rad_per_s: 600.0,
-        };
         for (hz, rounds) in [(500.0, 500_usize), (300.0, 300), (0.0, 0), (-1.0, 0), (f32::NAN, 0)] {
-            let mut drive = VescDrive::new(23, motor).with_status_hz(hz);
+            let mut drive = VescDrive::new(23, VESC).with_status_hz(hz);
             let mut packets = Vec::new();
             for _ in 0..4_000 {
                 drive.step(0.000_25);
@@ -415,7 +403,7 @@ mod tests {
             assert!(rounds.abs_diff(packets.len() / 3) <= 1, "{hz} Hz: {}", packets.len());
             assert!(packets.chunks(3).all(|round| round == [27, 16, 9]), "{hz} Hz");
         }
-        assert!(iter::from_fn(|| VescDrive::new(23, motor).next_frame()).next().is_none());
+        assert!(iter::from_fn(|| VescDrive::new(23, VESC).next_frame()).next().is_none());
     }
 
     /// Found by fuzzing: a range of torques below zero, and limits that are no numbers, ended the simulation.

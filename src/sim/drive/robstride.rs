@@ -9,6 +9,7 @@
 use super::{Drive, DriveShaft, float, within, wrapped};
 use crate::frame::CanFrame;
 use crate::robstride::Model;
+use core::f64::consts::PI;
 use embedded_can::{ExtendedId, Frame, Id};
 
 /// Parameter indices of the drive, in the order of their places.
@@ -147,7 +148,8 @@ impl RobStrideDrive {
     pub fn lose_supply(&mut self) {
         self.values = self.stored;
         self.write(0x7005, 0.0);
-        self.shaft.angle_rad = if self.is_cybergear { 0.0 } else { wrapped(self.shaft.angle_rad) };
+        self.shaft.angle_rad =
+            if self.is_cybergear { 0.0 } else { wrapped(self.shaft.angle_rad, PI) };
         (self.is_enabled, self.faults, self.operation) = (false, 0, [0.0; 5]);
     }
 
@@ -220,7 +222,7 @@ impl RobStrideDrive {
             |value: f64, most: f64| ((within(value, most) + most) * 65_535.0 / (2.0 * most)) as u64;
         let angle = self.shaft.angle_rad;
         let is_beyond = angle.abs() > pmax && !self.is_cybergear;
-        let angle = if is_beyond { rest_of(angle + pmax, 2.0 * pmax) - pmax } else { angle };
+        let angle = if is_beyond { wrapped(angle, pmax) } else { angle };
         let bits = field(angle, pmax) << 48
             | field(self.shaft.velocity_rad_per_s, vmax) << 32
             | field(self.shaft.torque_nm, tmax) << 16
@@ -350,12 +352,6 @@ impl Drive for RobStrideDrive {
 
 fn extended(raw: u32, data: [u8; 8]) -> CanFrame {
     CanFrame::of(ExtendedId::new(raw).unwrap_or(ExtendedId::MAX), data)
-}
-
-/// Returns the remainder of a division, not negative. The shaft stays within billions of turns.
-fn rest_of(value: f64, span: f64) -> f64 {
-    let rest = value % span;
-    if rest < 0.0 { rest + span } else { rest }
 }
 
 fn single(value: f64) -> f32 {
