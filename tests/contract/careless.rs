@@ -229,6 +229,14 @@ fn the_check_finds_what_a_careless_device_gets_wrong() {
     }
 }
 
+#[test]
+fn a_violation_names_rule_time_and_the_last_frame() {
+    let violation = careless(Mistake::MovesDisarmed).unwrap_err();
+    let text =
+        "DisarmedIsZero is broken after 2 ms, the last frame was 123 [8] 01 01 01 01 01 01 01 01";
+    assert_eq!(violation.to_string(), text);
+}
+
 /// What a struct of devices forgets to forward, or gets wrong on the way.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Slip {

@@ -165,11 +165,17 @@ pub struct Violation {
     pub rule: Rule,
     /// When, in milliseconds since the device was made.
     pub at_ms: u64,
+    /// The last frame that the device offered; of several in one update, the last that is not rest.
+    pub frame: Option<CanFrame>,
 }
 
 impl core::fmt::Display for Violation {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "{:?} is broken after {} ms", self.rule, self.at_ms)
+        write!(f, "{:?} is broken after {} ms, ", self.rule, self.at_ms)?;
+        match self.frame {
+            Some(frame) => write!(f, "the last frame was {frame:?}"),
+            None => f.write_str("without a frame"),
+        }
     }
 }
 
@@ -236,11 +242,13 @@ struct Run<S> {
     subject: S,
     ms: u64,
     turn: u32,
+    /// As [`Violation::frame`].
+    last: Option<CanFrame>,
 }
 
 impl<S: Subject> Run<S> {
     fn new(subject: S) -> Self {
-        Self { subject, ms: 1, turn: 0 }
+        Self { subject, ms: 1, turn: 0, last: None }
     }
 
     /// Starts with all motors heard, armed and driven, with the output range open.
@@ -296,7 +304,7 @@ impl<S: Subject> Run<S> {
     }
 
     fn expect(&self, holds: bool, rule: Rule) -> Result<(), Violation> {
-        if holds { Ok(()) } else { Err(Violation { rule, at_ms: self.ms }) }
+        if holds { Ok(()) } else { Err(Violation { rule, at_ms: self.ms, frame: self.last }) }
     }
 
     /// Lets a motor be heard; `false` when its frame is not taken.
@@ -349,10 +357,14 @@ impl<S: Subject> Run<S> {
         let mut output = Output::default();
         while let Some(frame) = self.subject.device().next_frame(self.turn) {
             output.frames += 1;
+            let drives = !self.subject.is_zero(&frame);
+            if drives || output.driving == 0 {
+                self.last = Some(frame);
+            }
             self.expect(output.frames <= MOST_FRAMES, Rule::IsBounded)?;
             let own = self.is_command(&frame);
             self.expect(own, Rule::SendsWhatItClaims)?;
-            output.driving += u32::from(!self.subject.is_zero(&frame));
+            output.driving += u32::from(drives);
             output.effort = output.effort.max(self.effort(&frame));
             output.last = Some(frame);
             let bytes = frame.header().to_be_bytes().into_iter().chain(*frame.bytes());
