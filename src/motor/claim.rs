@@ -106,7 +106,7 @@ impl Claim {
     }
 
     /// Returns the header of frames with the id, and the significant bits of the header.
-    pub(super) fn pattern(&self) -> (u32, u32) {
+    pub(crate) fn pattern(&self) -> (u32, u32) {
         (crate::frame::header_of(self.id), self.mask | !crate::frame::ID_MASK)
     }
 

@@ -3,7 +3,7 @@
 use super::Statistics;
 use super::statistics::{Meter, increment};
 use super::supervision::AbortPending;
-use super::watch::{Pending, Watch};
+use super::watch::{FrameKey, Pending, Watch};
 use crate::frame::CanFrame;
 use crate::motor::Devices;
 use crate::time::Instant;
@@ -215,7 +215,7 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
             Some(frame) if device.requeue(&frame) => {
                 increment(&mut statistics.evicted);
                 meter.discount(&frame);
-                watch.called_back(frame.header(), now);
+                watch.called_back(FrameKey::of(device, &frame), now);
             }
             frame => {
                 increment(&mut statistics.evicted_unrelated);
@@ -289,7 +289,10 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
                 Some(offered) => offered,
                 None => {
                     let frame = match self.device.next_frame(self.turn) {
-                        Some(frame) if yields == Some(frame.header()) && held.is_none() => {
+                        Some(frame)
+                            if yields.is_some_and(|it| it.fits(frame.header()))
+                                && held.is_none() =>
+                        {
                             held = Some(frame);
                             continue;
                         }
@@ -312,14 +315,15 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
                 Sent::Accepted => self.note_accepted(&frame),
                 Sent::Evicted => {
                     self.count_sent(&frame);
-                    let is_older = other.header() == frame.header();
+                    let key = FrameKey::of(self.device, &other);
+                    let is_older = key.fits(frame.header());
                     let place = ids.get_mut(evictions).filter(|_| !is_older);
                     let waits = place.is_some() && self.device.put_back(&other);
                     if waits || self.device.requeue(&other) {
                         increment(&mut self.statistics.evicted);
                         self.meter.discount(&other);
                         // Before the frame that took its place: both may have one id.
-                        self.watch.evicted(other.header(), self.now);
+                        self.watch.evicted(key, self.now);
                     } else {
                         increment(&mut self.statistics.evicted_unrelated);
                         evicted(&other);
@@ -351,20 +355,21 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
                         }
                     } else {
                         increment(&mut self.statistics.refused);
-                        self.watch.refused(frame.header(), self.now);
+                        self.watch.refused(FrameKey::of(self.device, &frame), self.now);
                     }
                     refused = Some(frame).filter(|frame| !self.device.put_back(frame));
                     break;
                 }
                 Sent::Failed(kind) => {
                     self.statistics.send_errors.count(kind);
-                    let tries = self.watch.refused(frame.header(), self.now);
+                    let key = FrameKey::of(self.device, &frame);
+                    let tries = self.watch.refused(key, self.now);
                     if tries >= PATIENCE && !is_first && goes_first.is_none() {
                         goes_first = Some(frame);
                     } else {
                         self.device.requeue(&frame);
                         if tries >= PATIENCE && is_first {
-                            self.pending.yields = Some(frame.header());
+                            self.pending.yields = Some(key);
                         }
                     }
                 }

@@ -3,6 +3,7 @@
 mod edge;
 
 pub use edge::BusCondition;
+pub(super) use edge::FrameKey;
 
 use crate::frame::CanFrame;
 use crate::time::{Duration, Instant, Tick};
@@ -151,7 +152,7 @@ impl Watch {
 #[derive(Debug)]
 pub(super) struct Pending {
     /// A frame that failed as the first, and therefore goes last in the next tick.
-    pub(super) yields: Option<u32>,
+    pub(super) yields: Option<FrameKey>,
     /// Frames that found no place wait in the device.
     pub(super) waits: bool,
     /// The device was armed in the tick.

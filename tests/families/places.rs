@@ -4,10 +4,13 @@
 
 use drivetrain::damiao::{Mode, Model, Motor};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{Devices, Own, VelocityDrive};
+use drivetrain::motor::{Devices, ImpedanceControl, Own, VelocityDrive};
+use drivetrain::robstride;
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::sim::{Controller, DamiaoDrive, Drive, DriveShaft, Line, Sender, Simulation};
-use drivetrain::time::Duration;
+use drivetrain::sim::{
+    Controller, DamiaoDrive, Drive, DriveShaft, Fault, Line, RobStrideDrive, Sender, Simulation,
+};
+use drivetrain::time::{Duration, Instant};
 use drivetrain::units::AngularVelocity;
 use embedded_can::{Frame, Id, StandardId};
 
@@ -98,5 +101,43 @@ fn four_and_six_drives_at_half_load_share_a_controller_with_three_places() {
         assert_eq!(fewest_commands::<6>(false, 4_000, poll_us), 250);
         assert_eq!(fewest_commands::<5>(true, 2_000, poll_us), 500);
         assert_eq!(fewest_commands::<6>(true, 4_000, poll_us), 250);
+    }
+}
+
+/// A frame of a RobStride carries its torque in the id. Frames that found no place while the cable was out for a moment must be known
+/// again by their motor, not by their torque: they count as sent then.
+#[test]
+fn a_cable_that_is_out_for_a_moment_is_no_bus_that_is_down() {
+    for (period_us, gap_ms) in [(4_000, 5), (4_000, 9), (2_000, 7), (5_000, 9)] {
+        let (world, model) = (Simulation::new(1), robstride::Model::RS02);
+        let mode = || ImpedanceControl::new(5.0).unwrap();
+        let joints =
+            [1, 2, 3].map(|id| Own::new(robstride::Motor::new(model, id, mode()).unwrap()));
+        let mut drives = [1, 2, 3]
+            .map(|id| RobStrideDrive::of(model, id).with_shaft(DriveShaft::new(0.25, 0.5)));
+        let period = Duration::from_micros(period_us);
+        let mut runner =
+            Runner::new(Nb(world.controller()), world.clock(), joints).with_period(period);
+        let at_ms = |ms: u64| Instant::from_micros(1_000 * ms);
+        world.fault(Fault::Unplugged(Line::Can1), at_ms(1_000)..at_ms(1_000 + gap_ms)).unwrap();
+        for step in 0..12_000 {
+            let [one, two, three] = &mut drives;
+            let on: [&mut dyn Drive; 3] = [one, two, three];
+            let mut on = on.map(|drive| (Line::Can1, drive));
+            world.advance_drives(Duration::from_micros(250), &mut on).unwrap();
+            runner.poll(32);
+            let Some(tick) = runner.due() else { continue };
+            if !runner.is_armed() && (600..700).contains(&(step / 4)) {
+                runner.arm(tick).unwrap();
+            }
+            for (place, joint) in runner.device_mut().iter_mut().enumerate() {
+                let torque_nm = 0.3 * (0.01 * step as f32 + place as f32).sin();
+                _ = joint.set_torque(torque_nm);
+            }
+            runner.tick(tick);
+            assert_eq!(runner.next_edge(), None, "period {period_us} us, {gap_ms} ms");
+        }
+        assert!(runner.is_armed(), "period {period_us} us, {gap_ms} ms");
+        assert!(runner.statistics().refused > 0, "the cable was not missed");
     }
 }

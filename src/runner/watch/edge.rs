@@ -2,8 +2,11 @@
 //! driver: the time that each has waited.
 
 use super::{BUS_LOST_AFTER, Watch};
-use crate::motor::take_age;
+use crate::frame::CanFrame;
+use crate::motor::{Claim, Devices, Role, take_age};
 use crate::time::{Duration, Edge, Instant};
+use core::num::NonZeroU32;
+use embedded_can::Frame;
 
 /// A fault of the bus as a whole, for a moment or for hours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -195,14 +198,35 @@ const FORGOTTEN_AFTER: (Duration, u8) = (Duration::from_secs(1), 32);
 /// How many frames can wait at a time and be watched each: the five of a DJI bus, and own ones.
 pub(super) const WATCHED_FRAMES: usize = 8;
 
+/// The frames of one command: their headers agree in the bits of the mask. A RobStride has a torque in the other bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::runner) struct FrameKey {
+    header: u32,
+    mask: NonZeroU32,
+}
+
+impl FrameKey {
+    /// Finds the command of a device to which a frame belongs.
+    pub(in crate::runner) fn of(device: &mut impl Devices, frame: &CanFrame) -> Self {
+        let covers = |claim: &Claim| claim.role() == Role::Command && claim.covers(frame.id());
+        let mask =
+            device.claims().find(covers).and_then(|claim| NonZeroU32::new(claim.pattern().1));
+        let mask = mask.unwrap_or(NonZeroU32::MAX);
+        Self { header: frame.header() & mask.get(), mask }
+    }
+
+    pub(in crate::runner) const fn fits(self, header: u32) -> bool {
+        header & self.mask.get() == self.header
+    }
+}
+
 /// A command frame not taken by the driver. Times are stamps, compared in each tick.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Unsent {
-    header: u32,
+    key: FrameKey,
     since: u32,
+    /// The last tick in which the frame was offered, or taken by the driver.
     offered: u32,
-    /// The tick in which the driver took the frame.
-    accepted: u32,
     /// The driver took the frame, and the frame may come back.
     is_accepted: bool,
     /// Whether the frame was called back after a whole tick: then the frame was not sent, although the driver takes it.
@@ -215,29 +239,29 @@ pub(super) struct Unsent {
 impl Unsent {
     /// Tells whether the driver took the frame in an earlier tick, and the frame did not come back.
     const fn stays_sent(&self, now: Instant) -> bool {
-        self.is_accepted && self.accepted != now.stamp()
+        self.is_accepted && self.offered != now.stamp()
     }
 }
 
 impl Watch {
     pub(super) fn accept_unsent(&mut self, header: u32, now: Instant) {
         for place in &mut self.unsent {
-            let Some(unsent) = place.as_mut().filter(|unsent| unsent.header == header) else {
+            let Some(unsent) = place.as_mut().filter(|unsent| unsent.key.fits(header)) else {
                 continue;
             };
             if unsent.stays_sent(now) {
                 *place = None;
             } else {
-                (unsent.accepted, unsent.is_accepted) = (now.stamp(), true);
-                (unsent.offered, unsent.tries, unsent.idle) = (now.stamp(), 0, 0);
+                (unsent.offered, unsent.is_accepted) = (now.stamp(), true);
+                (unsent.tries, unsent.idle) = (0, 0);
             }
         }
     }
 
     /// Notes a frame not taken by the driver; returns the number of refusals in a row.
-    pub(in crate::runner) fn refused(&mut self, header: u32, now: Instant) -> u8 {
-        let Some(unsent) = self.unsent.iter_mut().flatten().find(|it| it.header == header) else {
-            self.begin(header, now);
+    pub(in crate::runner) fn refused(&mut self, key: FrameKey, now: Instant) -> u8 {
+        let Some(unsent) = self.unsent_of(key) else {
+            self.begin(key, now);
             return 1;
         };
         if core::mem::take(&mut unsent.is_accepted) {
@@ -250,31 +274,34 @@ impl Watch {
     }
 
     /// Notes a frame that the driver had taken and gave back.
-    pub(in crate::runner) fn evicted(&mut self, header: u32, now: Instant) {
-        match self.unsent.iter_mut().flatten().find(|it| it.header == header) {
+    pub(in crate::runner) fn evicted(&mut self, key: FrameKey, now: Instant) {
+        match self.unsent_of(key) {
             Some(unsent) => {
                 (unsent.is_accepted, unsent.offered, unsent.idle) = (false, now.stamp(), 0);
             }
-            None => self.begin(header, now),
+            None => self.begin(key, now),
         }
     }
 
     /// Notes a frame called back after a whole tick in the controller.
     #[cold]
-    pub(in crate::runner) fn called_back(&mut self, header: u32, now: Instant) {
-        self.evicted(header, now);
-        if let Some(unsent) = self.unsent.iter_mut().flatten().find(|it| it.header == header) {
+    pub(in crate::runner) fn called_back(&mut self, key: FrameKey, now: Instant) {
+        self.evicted(key, now);
+        if let Some(unsent) = self.unsent_of(key) {
             unsent.returns = true;
         }
     }
 
-    fn begin(&mut self, header: u32, now: Instant) {
+    fn unsent_of(&mut self, key: FrameKey) -> Option<&mut Unsent> {
+        self.unsent.iter_mut().flatten().find(|unsent| unsent.key == key)
+    }
+
+    fn begin(&mut self, key: FrameKey, now: Instant) {
         if let Some(place) = self.unsent.iter_mut().find(|unsent| unsent.is_none()) {
             *place = Some(Unsent {
-                header,
+                key,
                 since: now.stamp(),
                 offered: now.stamp(),
-                accepted: 0,
                 is_accepted: false,
                 returns: false,
                 tries: 1,
@@ -288,11 +315,12 @@ impl Watch {
         let mut lost = false;
         for place in &mut self.unsent {
             let Some(unsent) = place else { continue };
+            let stays_sent = unsent.stays_sent(now);
             let waits = take_age(now, &mut unsent.since);
             let is_forgotten = take_age(now, &mut unsent.offered) >= FORGOTTEN_AFTER.0
                 || unsent.idle >= FORGOTTEN_AFTER.1;
             unsent.idle = unsent.idle.saturating_add(1);
-            if unsent.stays_sent(now) || is_forgotten {
+            if stays_sent || is_forgotten {
                 *place = None;
             } else if !unsent.is_accepted || unsent.returns {
                 lost |= waits >= BUS_LOST_AFTER;
@@ -318,6 +346,10 @@ mod tests {
 
     fn at_ms(ms: u64) -> Instant {
         Instant::from_micros(1_000 * ms)
+    }
+
+    fn exactly(header: u32) -> FrameKey {
+        FrameKey { header, mask: NonZeroU32::MAX }
     }
 
     fn drained(edges: &mut Edges) -> Vec<(BusCondition, u64, bool)> {
@@ -405,7 +437,7 @@ mod tests {
         for ms in 1..1_000 {
             let now = Instant::from_micros(1_000 * ms);
             if ms % 101 == 1 {
-                watch.refused(0x0C5, now);
+                watch.refused(exactly(0x0C5), now);
             }
             assert!(!watch.finish(now), "{ms} ms");
         }
@@ -417,7 +449,7 @@ mod tests {
         let mut watch = Watch::new();
         let lost = (1..300_u32).find(|ms| {
             let now = Instant::from_micros(1_000 * u64::from(*ms));
-            watch.refused(0x100 + ms % 30, now);
+            watch.refused(exactly(0x100 + ms % 30), now);
             watch.finish(now)
         });
         assert!(lost.is_some_and(|ms| (100..150).contains(&ms)), "{lost:?}");

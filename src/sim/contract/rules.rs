@@ -307,7 +307,8 @@ fn requeue<S: Subject>(mut run: Run<S>) -> Outcome {
     run.expect(output.frames > 0 && output.driving == 0, Rule::RequeuedComesAgain)?;
     let foreign = unclaimed(run.subject.device());
     for foreign in foreign.into_iter().chain(twins(&frame)) {
-        let taken = run.subject.device().requeue(&foreign);
+        let device = run.subject.device();
+        let taken = device.put_back(&foreign) || device.requeue(&foreign);
         run.expect(!taken, Rule::ForeignIsNotRequeued)?;
     }
     Ok(())
