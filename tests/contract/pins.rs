@@ -162,8 +162,9 @@ impl<M: OnPins> CanDevice for Wired<M> {
         waits.then(|| CanFrame::new(id(COMMAND), &self.pulse.0.get().to_be_bytes())).flatten()
     }
     fn put_back(&mut self, frame: &CanFrame) -> bool {
-        self.waits |= frame.id() == id(COMMAND).into();
-        self.waits
+        let is_own = CanDevice::requeue(self, frame);
+        self.waits |= is_own;
+        is_own
     }
     fn requeue(&mut self, frame: &CanFrame) -> bool {
         frame.id() == id(COMMAND).into() && frame.is_data_frame()

@@ -305,10 +305,9 @@ fn requeue<S: Subject>(mut run: Run<S>) -> Outcome {
     run.subject.device().requeue(&frame);
     let output = run.step()?;
     run.expect(output.frames > 0 && output.driving == 0, Rule::RequeuedComesAgain)?;
-    let foreign = unclaimed(run.subject.device());
-    for foreign in foreign.into_iter().chain(twins(&frame)) {
-        let device = run.subject.device();
-        let taken = device.put_back(&foreign) || device.requeue(&foreign);
+    for foreign in unclaimed(run.subject.device()).into_iter().chain(twins(&frame)) {
+        let taken = run.subject.device().put_back(&foreign);
+        let taken = taken || run.subject.device().requeue(&foreign);
         run.expect(!taken, Rule::ForeignIsNotRequeued)?;
     }
     Ok(())
