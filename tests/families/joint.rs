@@ -8,8 +8,9 @@ use drivetrain::math::wrap_pi;
 use drivetrain::motor::{
     AngleDrive, Devices, Impedance, ImpedanceControl, Ingest, Link, Own, OwnMotor, TargetError,
 };
-use drivetrain::sim::{DamiaoDrive, Drive};
-use drivetrain::time::{Instant, Tick};
+use drivetrain::runner::{Nb, Runner};
+use drivetrain::sim::{DamiaoDrive, Drive, DriveShaft, Line, RobStrideDrive, Simulation};
+use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use drivetrain::{damiao, lk, odrive, rmd, robstride, vesc};
 use std::f32::consts::TAU;
@@ -258,4 +259,65 @@ fn a_zero_is_given_to_drives_alone_that_know_their_angle() {
 
 fn gains() -> ImpedanceControl {
     ImpedanceControl::new(2.0).unwrap().with_gains(20.0, 0.6).unwrap()
+}
+
+/// Runs a joint at its zero whose drive loses its supply after a second and is dark for so long. Returns the angle of the joint before
+/// and after, and how far the shaft turned.
+fn brown_out(
+    model: robstride::Model,
+    start: f32,
+    (dark_ms, is_on): (u64, bool),
+) -> (Option<Angle>, Option<Angle>, f32) {
+    let world = Simulation::new(1);
+    let mut drive = RobStrideDrive::of(model, 1).with_shaft(DriveShaft::new(0.05, 0.5));
+    drive.shaft_mut().set_angle(start);
+    let mode = ImpedanceControl::new(5.0).unwrap();
+    let joint = Own::new(robstride::Motor::new(model, 1, mode).unwrap());
+    let mut runner = Runner::new(Nb(world.controller()), world.clock(), joint);
+    let (mut before, mut turned) = (None, 0.0_f32);
+    for ms in 0..3_000_u64 {
+        if ms == 1_000 {
+            before = runner.device().angle(());
+            drive.lose_supply();
+        }
+        let from = drive.shaft().angle_rad();
+        let is_dark = (1_000..1_000 + dark_ms).contains(&ms);
+        let mut on: [(Line, &mut dyn Drive); 1] = [(Line::Can1, &mut drive)];
+        let on = if is_dark { &mut [][..] } else { &mut on[..] };
+        world.advance_drives(Duration::from_millis(1), on).unwrap();
+        turned += (drive.shaft().angle_rad() - from).abs();
+        runner.poll(16);
+        let Some(tick) = runner.due() else { continue };
+        match ms {
+            300 => runner.device_mut().set_present_angle(Angle::ZERO).unwrap(),
+            400 | 2_000 => runner.arm(tick).unwrap(),
+            900 if !is_on => runner.device_mut().disarm(),
+            // The switch turns off, whatever happened.
+            1_900 => runner.device_mut().disarm(),
+            _ => {}
+        }
+        let spring = Impedance { stiffness: 10.0, damping: 1.0, ..Impedance::FREE };
+        _ = runner.device_mut().set_impedance(spring);
+        runner.tick(tick);
+    }
+    (before, runner.device().angle(()), turned)
+}
+
+#[test]
+fn a_drive_that_starts_again_at_once_keeps_the_joint_where_it_is_or_loses_its_zero() {
+    for dark_ms in [0, 5, 20, 60, 99, 150, 500] {
+        for is_on in [true, false] {
+            let case = format!("dark for {dark_ms} ms, armed: {is_on}");
+            // Beyond half a turn of the drive, which is lost.
+            let (before, after, turned) = brown_out(robstride::Model::RS03, 3.6, (dark_ms, is_on));
+            let off = |angle: Option<Angle>| angle.unwrap().as_radians().abs();
+            assert!(off(before) < 0.01 && off(after) < 0.01, "{case}: {after:?}");
+            assert!(turned < 0.05, "{case}: the shaft turned by {turned} rad");
+            // The CyberGear counts from where it is switched on.
+            let (before, after, turned) =
+                brown_out(robstride::Model::CYBERGEAR, 1.5, (dark_ms, is_on));
+            assert!(off(before) < 0.01 && after.is_none(), "{case}: {after:?}");
+            assert!(turned < 0.05, "{case}: the shaft turned by {turned} rad");
+        }
+    }
 }

@@ -205,7 +205,7 @@ impl<M: OwnMotor> Own<M> {
         if was_online && !self.was_online {
             self.motor.forget_settings();
         }
-        self.place_zero();
+        self.joint.place_zero(self.measured_angle());
         let is_idle = !self.power.is_on() && !self.has_posted && self.offered.is_rest;
         let is_due = now < self.inquired || now.since(self.inquired) >= INQUIRY;
         if !is_idle || !is_due || self.motor.is_enabled() == Some(true) {

@@ -4,6 +4,27 @@ use super::{Impedance, Own, OwnMotor, Target};
 use crate::motor::{AngleDrive, Capabilities, Capability, TargetError, VelocityDrive};
 use crate::units::{Angle, AngularVelocity};
 
+/// No shaft turns further between two frames than at the larger of both velocities, and this much, in rad and of that way.
+const WAY: (f32, f32) = (0.5, 0.5);
+
+/// Angle and velocity of the shaft, as the drive reports them.
+pub(super) struct Reading(pub(super) Option<Angle>, pub(super) AngularVelocity);
+
+impl Reading {
+    /// Returns the way to a later reading.
+    pub(super) fn way_to(&self, later: &Self) -> Option<Angle> {
+        Some(later.0? - self.0?)
+    }
+
+    /// Tells whether the angle of a later reading is further away than the shaft turned meanwhile: the drive counts anew.
+    pub(super) fn jumps_to(&self, later: &Self, gap_us: u32) -> bool {
+        let fastest = self.1.as_rad_per_s().abs().max(later.1.as_rad_per_s().abs());
+        let turned = fastest * gap_us as f32 * 1e-6;
+        self.way_to(later)
+            .is_some_and(|way| way.as_radians().abs() > turned + WAY.0 + WAY.1 * turned)
+    }
+}
+
 /// The direction and the zero of the joint: its angle is `sign * (angle of the drive - zero)`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Joint {
@@ -30,16 +51,33 @@ impl Joint {
     /// The joint turns and counts as its drive.
     pub(super) const DIRECT: Self = Self { sign: 1.0, zero: Zero::OfDrive };
 
-    /// The drive may have lost its supply between two angles, in which the joint turned by less than half a turn.
-    pub(super) fn doubt_zero(&mut self, before: Option<Angle>, after: Option<Angle>) {
-        self.zero = match (self.zero, before, after) {
-            (Zero::Placed(zero), Some(before), Some(after)) => {
-                let way = after - before;
-                Zero::Placed(zero + way - way.wrapped())
+    /// Places a given zero in the turn where the joint is heard first.
+    pub(super) fn place_zero(&mut self, measured: Option<Angle>) {
+        if let (Zero::Given(zero), Some(measured)) = (self.zero, measured) {
+            self.zero = Zero::Placed(measured - (measured - zero).wrapped());
+        }
+    }
+
+    /// Tells whether the zero is lost, or its turn, if the drive counts its turns anew.
+    pub(super) const fn depends_on_supply(&self) -> bool {
+        matches!(self.zero, Zero::Placed(_) | Zero::Found(_))
+    }
+
+    /// The drive may have counted anew between two angles, `way` apart, in which the joint turned by less than half a turn. Returns by
+    /// how much the drive counts further than before; `None` if the zero is lost.
+    pub(super) fn doubt_zero(&mut self, way: Option<Angle>) -> Option<Angle> {
+        match (self.zero, way) {
+            (Zero::Placed(zero), Some(way)) => {
+                let turns = way - way.wrapped();
+                self.zero = Zero::Placed(zero + turns);
+                Some(turns)
             }
-            (Zero::Placed(_) | Zero::Found(_), ..) => Zero::Lost,
-            (zero, ..) => zero,
-        };
+            (Zero::Placed(_) | Zero::Found(_), _) => {
+                self.zero = Zero::Lost;
+                None
+            }
+            _ => Some(Angle::ZERO),
+        }
     }
 
     const fn zero(&self) -> Option<Angle> {

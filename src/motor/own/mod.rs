@@ -32,7 +32,7 @@ use crate::frame::CanFrame;
 use crate::time::{Duration, Instant};
 use crate::units::{Angle, AngularVelocity};
 use embedded_can::Frame;
-use joint::{Joint, Zero};
+use joint::{Joint, Reading, Zero};
 use power::Power;
 use route::{Offered, Route};
 
@@ -165,8 +165,9 @@ impl<M: OwnMotor> Own<M> {
     /// Makes the present angle of the joint so much; the shaft follows its target as before.
     ///
     /// A drive without [`Capability::AbsoluteAngle`] counts from another angle when it has lost its supply. Once no feedback was taken for
-    /// 100 ms, or for longer where it is late only then, the joint has no angle, and targets with an angle are refused as [`TargetError::NotHomed`], until this is called
-    /// again. A joint that was never given a zero counts as its drive, and has none to lose.
+    /// 100 ms, or for longer where it is late only then, or an angle is further away than the shaft turned since the feedback before, the
+    /// zero is lost. The motor trips, the joint has no angle, and targets with an angle are refused as [`TargetError::NotHomed`], until
+    /// this is called again. A joint that was never given a zero counts as its drive, and has none to lose.
     ///
     /// # Errors
     /// [`TargetError::NoFeedback`] without fresh feedback with an angle, [`TargetError::NotFinite`] for an angle beyond 10 000 rad.
@@ -303,30 +304,41 @@ impl<M: OwnMotor> Own<M> {
             return Ingest::Taken;
         }
         let gap_us = self.guard.gap_us(now);
-        if let Some(gap_us) = gap_us.filter(|gap_us| *gap_us > SILENCE_US) {
-            return self.take_after_silence(frame, gap_us, now);
-        }
+        let before = self.joint.depends_on_supply().then(|| self.reading());
         let outcome = self.motor.decode(frame);
         if outcome == Ingest::Taken {
             self.hear(gap_us, now);
+            let gap_us = gap_us.unwrap_or(0);
+            let jumps = |before: &Reading| before.jumps_to(&self.reading(), gap_us);
+            if gap_us > SILENCE_US || before.as_ref().is_some_and(jumps) {
+                self.start_anew(before, gap_us, now);
+            }
         }
         outcome
     }
 
-    /// Takes feedback after a silence in which the drive may have started again, unless feedback is late only after more.
+    fn reading(&self) -> Reading {
+        Reading(self.motor.angle(), self.motor.velocity())
+    }
+
+    /// The drive may have started again: in a silence, unless feedback is late only after more, or before an angle that jumped. The joint
+    /// stays where it is, with its target; without its zero, it trips.
     #[cold]
     #[inline(never)]
-    fn take_after_silence(&mut self, frame: &CanFrame, gap_us: u32, now: Instant) -> Ingest {
-        let before = self.motor.angle();
-        let outcome = self.motor.decode(frame);
-        if outcome == Ingest::Taken {
-            if self.guard.is_late_by(gap_us) {
-                self.motor.forget_settings();
-                self.joint.doubt_zero(before, self.motor.angle());
-            }
-            self.hear(Some(gap_us), now);
+    fn start_anew(&mut self, before: Option<Reading>, gap_us: u32, now: Instant) {
+        let is_silence = gap_us > SILENCE_US && self.guard.is_late_by(gap_us);
+        if is_silence {
+            self.motor.forget_settings();
         }
-        outcome
+        let after = self.reading();
+        let is_new = |before: &Reading| is_silence || before.jumps_to(&after, gap_us);
+        let Some(before) = before.filter(is_new) else { return };
+        if let Some(turns) = self.joint.doubt_zero(before.way_to(&after)) {
+            self.target = self.target.moved(turns);
+            self.start = self.start.map(|start| start + turns);
+        } else {
+            self.fail(now);
+        }
     }
 
     #[inline(always)]
@@ -374,12 +386,5 @@ impl<M: OwnMotor> Own<M> {
         let vitals = Vitals { error: Some(Severity::Fault), ..self.motor.vitals() };
         _ = self.watch.check(&mut self.guard, || vitals, now);
         self.guard.relax_until_armed();
-    }
-
-    /// Places a given zero in the turn where the joint is heard first.
-    fn place_zero(&mut self) {
-        if let (Zero::Given(zero), Some(measured)) = (self.joint.zero, self.measured_angle()) {
-            self.joint.zero = Zero::Placed(measured - (measured - zero).wrapped());
-        }
     }
 }

@@ -223,6 +223,17 @@ pub enum Target {
 }
 
 impl Target {
+    /// The same target where the angles are so much larger.
+    pub(super) fn moved(self, way: Angle) -> Self {
+        match self {
+            Self::Angle(angle) => Self::Angle(angle + way),
+            Self::Impedance(impedance) => {
+                Self::Impedance(Impedance { angle: impedance.angle + way, ..impedance })
+            }
+            Self::Torque(_) | Self::Velocity(_) => self,
+        }
+    }
+
     pub(super) const fn is_finite(&self) -> bool {
         match self {
             Self::Torque(torque_nm) => torque_nm.is_finite(),
