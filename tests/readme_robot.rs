@@ -31,8 +31,8 @@ impl Plan<'_> {
 }
 
 impl Pilot for Plan<'_> {
-    fn is_switch_on(&self) -> bool {
-        self.on.iter().any(|on| on.contains(&self.ms()))
+    fn is_switch_on(&self) -> Option<bool> {
+        Some(self.on.iter().any(|on| on.contains(&self.ms())))
     }
     fn clears_stop(&mut self) -> bool {
         self.ms() == self.clear

@@ -175,6 +175,60 @@ impl core::fmt::Display for WrongSetting {
     }
 }
 
+/// The switch by which a person arms a robot: only its turn from off to on does.
+///
+/// The position is unknown while a remote control is not heard. A switch that is on at power-on, after the reset of a watchdog, or when
+/// the remote control is heard again, arms nothing until it was off.
+///
+/// # Examples
+/// ```
+/// use drivetrain::motor::{ArmingSwitch, SwitchOrder};
+///
+/// let mut switch = ArmingSwitch::new();
+/// assert_eq!(switch.read(true), SwitchOrder::Keep); // on at power-on: disarmed, as it was
+/// assert_eq!(switch.read(false), SwitchOrder::Disarm);
+/// assert_eq!(switch.read(true), SwitchOrder::Arm);
+/// assert_eq!(switch.read(None), SwitchOrder::Disarm); // not heard
+/// assert_eq!(switch.read(true), SwitchOrder::Keep); // heard again, and nobody has turned the switch
+/// ```
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ArmingSwitch {
+    was_off: bool,
+}
+
+impl ArmingSwitch {
+    /// Makes a switch whose position was not read yet.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { was_off: false }
+    }
+
+    /// Takes the position, on or off, and `None` while it is not known: once a tick.
+    #[must_use]
+    pub fn read(&mut self, is_on: impl Into<Option<bool>>) -> SwitchOrder {
+        let is_on = is_on.into();
+        let was_off = core::mem::replace(&mut self.was_off, is_on == Some(false));
+        match is_on {
+            Some(true) if was_off => SwitchOrder::Arm,
+            Some(true) => SwitchOrder::Keep,
+            Some(false) | None => SwitchOrder::Disarm,
+        }
+    }
+}
+
+/// What an [`ArmingSwitch`] asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum SwitchOrder {
+    /// The switch was turned on just now.
+    Arm,
+    /// The switch is on as before: armed motors stay armed, and others disarmed.
+    Keep,
+    /// The switch is off, or its position is not known.
+    Disarm,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -44,7 +44,7 @@ mod own;
 mod safety;
 mod watch;
 
-pub use arming::{ArmError, Missing, WrongSetting};
+pub use arming::{ArmError, ArmingSwitch, Missing, SwitchOrder, WrongSetting};
 pub use capability::{Capabilities, Capability};
 pub use claim::{Claim, MotorName, Role};
 pub(crate) use device::Ask;

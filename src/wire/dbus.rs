@@ -246,6 +246,22 @@ pub enum Switch {
     Middle,
 }
 
+impl Switch {
+    /// Tells whether the switch is at a position; `None` without a signal.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::wire::dbus::Switch;
+    ///
+    /// assert_eq!(Switch::Middle.is_at(Switch::Up), Some(false));
+    /// assert_eq!(Switch::Absent.is_at(Switch::Up), None);
+    /// ```
+    #[must_use]
+    pub fn is_at(self, position: Self) -> Option<bool> {
+        (self != Self::Absent).then_some(self == position)
+    }
+}
+
 /// The pressed keys, one bit a key, as received.
 ///
 /// # Examples

@@ -3,7 +3,7 @@ use drivetrain::control::PidConfig;
 use drivetrain::dji::{self, Gm6020Voltage, M3508};
 use drivetrain::frame::CanFrame;
 use drivetrain::geometry::{Heading, Twist, World, Vec2};
-use drivetrain::motor::{ArmError, Condition, MotorName, VelocityDrive};
+use drivetrain::motor::{ArmError, ArmingSwitch, Condition, MotorName, SwitchOrder, VelocityDrive};
 use drivetrain::runner::{EmergencyStop, Nb, Runner};
 use drivetrain::time::{Clock, Edge};
 use drivetrain::units::{Angle, AngularVelocity};
@@ -15,7 +15,7 @@ const RATE: PidConfig = PidConfig::new(1.0, 5.0, 0.0); // V per rad/s, V per rad
 static STOP: EmergencyStop = EmergencyStop::new(); // `STOP.set()`, from an interrupt too
 
 trait Pilot {
-    fn is_switch_on(&self) -> bool; // as it stands: on drives, off disarms
+    fn is_switch_on(&self) -> Option<bool>; // as it stands; `None` while the remote control is not heard
     fn clears_stop(&mut self) -> bool; // on purpose, when what set STOP is over
     fn twist(&self) -> Twist<World>; // m/s and rad/s, in the world's frame
     fn heading(&self) -> Heading; // from the IMU
@@ -42,19 +42,15 @@ fn robot(
     let mecanum = Mecanum::new(0.076, Vec2::new(0.20, 0.18))?; // in m: wheel radius, front left wheel from the centre
     let fastest = AngularVelocity::from_rpm(450.0);
     let mut runner = Runner::new(Nb(can), clock, bus).with_emergency_stop(&STOP);
-    let mut was_on = true; // a switch that is on at power-on, or after a watchdog's reset, arms nothing
+    let mut switch = ArmingSwitch::new(); // on at power-on, or after a watchdog's reset, it arms nothing
     loop {
         runner.poll_with(16, |other| pilot.offer(other)); // bounded; foreign frames are yours
         let Some(tick) = runner.due() else { continue }; // 1 kHz on a grid, overruns counted
-        let is_on = pilot.is_switch_on();
-        if !is_on {
-            runner.device_mut().disarm();
-        } else if !was_on {
-            if let Err(why) = runner.arm(tick) {
-                pilot.report(why);
-            }
+        match switch.read(pilot.is_switch_on()) {
+            SwitchOrder::Arm => runner.arm(tick).unwrap_or_else(|why| pilot.report(why)),
+            SwitchOrder::Keep => {}
+            SwitchOrder::Disarm => runner.device_mut().disarm(),
         }
-        was_on = is_on;
         if pilot.clears_stop() {
             runner.clear_emergency_stop(); // then the switch, off and on, arms
         }

@@ -74,8 +74,8 @@ impl Base {
 #[cfg(test)]
 pub mod tests {
     use super::*;
-    use crate::switch::{Order, Switch};
     use drivetrain::geometry::Vec2;
+    use drivetrain::motor::{ArmingSwitch, SwitchOrder};
     use drivetrain::runner::{Nb, Runner};
     use drivetrain::sim::{ChassisConfig, MotorConfig, MotorKey, SimError, Simulation, Wheel};
     use drivetrain::time::Duration;
@@ -103,15 +103,15 @@ pub mod tests {
         let mut bus = Bus::branded();
         let mut base = Base::new(&mut bus).unwrap();
         let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
-        let mut switch = Switch::START;
+        let mut switch = ArmingSwitch::new();
         for ms in 0..3_500 {
             world.advance(Duration::from_millis(1));
             runner.poll(16);
             let Some(tick) = runner.due() else { continue };
             match switch.read(ms >= 100) {
-                Order::Arm => runner.arm(tick).unwrap(),
-                Order::Keep => {}
-                Order::Disarm => runner.device_mut().disarm(),
+                SwitchOrder::Arm => runner.arm(tick).unwrap(),
+                SwitchOrder::Keep => {}
+                SwitchOrder::Disarm => runner.device_mut().disarm(),
             }
             let left = if (500..2_500).contains(&ms) { 0.5 } else { 0.0 };
             base.drive(runner.device_mut(), Twist::new(0.0, left, 0.0), tick);

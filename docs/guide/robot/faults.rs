@@ -6,7 +6,7 @@ use drivetrain::runner::{BusCondition, EmergencyStop};
 use drivetrain::sim::{Fault, Line, Simulation};
 use drivetrain::time::{Duration, Instant};
 
-const OFF: Wish = Wish { is_on: false, ..WISH };
+const OFF: Wish = Wish { is_on: Some(false), ..WISH };
 
 const fn ms(ms: u64) -> Instant {
     Instant::from_micros(1_000 * ms)

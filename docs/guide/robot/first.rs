@@ -1,5 +1,6 @@
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, M3508};
+use drivetrain::motor::{ArmingSwitch, SwitchOrder};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{MotorConfig, Simulation};
 use drivetrain::time::Duration;
@@ -14,20 +15,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let wheel = bus.attach(Config::<M3508>::new(1).speed_loop(speed))?;
     let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
 
-    let mut was_on = true; // a switch that is on at power-on arms nothing
+    let mut switch = ArmingSwitch::new(); // on at power-on, it arms nothing
     let mut fastest_rpm = 0.0_f32;
     for ms in 0..2_000 {
         world.advance(Duration::from_millis(1)); // on a board, time passes by itself
         runner.poll(16); // takes received frames
         let Some(tick) = runner.due() else { continue }; // once a millisecond
 
-        let is_on = (100..1_500).contains(&ms);
-        if !is_on {
-            runner.device_mut().disarm();
-        } else if !was_on {
-            runner.arm(tick)?; // the switch turned on
+        match switch.read((100..1_500).contains(&ms)) {
+            SwitchOrder::Arm => runner.arm(tick)?, // turned on just now
+            SwitchOrder::Keep => {}
+            SwitchOrder::Disarm => runner.device_mut().disarm(),
         }
-        was_on = is_on;
 
         // Refused without harm unless the motor is armed.
         _ = runner.device_mut().set_velocity(wheel, AngularVelocity::from_rpm(100.0));

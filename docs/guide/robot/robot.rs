@@ -1,9 +1,8 @@
 use crate::base::{Base, Lower, SetupError};
-use crate::switch::{Order, Switch};
 use crate::turret::{Turret, Upper};
 use drivetrain::dji::Bus;
 use drivetrain::geometry::{Body, Twist};
-use drivetrain::motor::ArmError;
+use drivetrain::motor::{ArmError, ArmingSwitch, SwitchOrder};
 use drivetrain::runner::{EmergencyStop, Port, Runner};
 use drivetrain::shooter::ShooterOrder;
 use drivetrain::time::{Clock, Tick};
@@ -13,7 +12,7 @@ use drivetrain::wire::referee::BarrelHeat;
 /// The targets of the robot for this millisecond.
 #[derive(Debug, Clone, Copy)]
 pub struct Wish {
-    pub is_on: bool,
+    pub is_on: Option<bool>, // `None` while the switch is not known
     pub twist: Twist<Body>,
     pub angle: Angle,
     pub order: ShooterOrder,
@@ -27,7 +26,7 @@ pub struct Robot<P, K> {
     pub upper: Runner<P, K, Bus<Upper>>,
     pub base: Base,
     pub turret: Turret,
-    switch: Switch,
+    switch: ArmingSwitch,
 }
 
 impl<P: Port, K: Clock + Copy> Robot<P, K> {
@@ -42,7 +41,7 @@ impl<P: Port, K: Clock + Copy> Robot<P, K> {
         let (base, turret) = (Base::new(&mut wheels)?, Turret::new(&mut gimbal)?);
         let lower = Runner::new(lower, clock, wheels).with_emergency_stop(stop);
         let upper = Runner::new(upper, clock, gimbal).with_emergency_stop(stop);
-        Ok(Self { lower, upper, base, turret, switch: Switch::START })
+        Ok(Self { lower, upper, base, turret, switch: ArmingSwitch::new() })
     }
 
     /// Runs the steps that are due. `limit` sees the commands of the wheels before they are sent.
@@ -57,9 +56,9 @@ impl<P: Port, K: Clock + Copy> Robot<P, K> {
         let mut refusal = None;
         if let Some(tick) = self.lower.due() {
             match self.switch.read(wish.is_on) {
-                Order::Arm => refusal = self.arm(tick),
-                Order::Keep => {}
-                Order::Disarm => self.disarm(),
+                SwitchOrder::Arm => refusal = self.arm(tick),
+                SwitchOrder::Keep => {}
+                SwitchOrder::Disarm => self.disarm(),
             }
             // Armed means all wheels: when one is lost, the others brake.
             let twist = if self.lower.is_armed() { wish.twist } else { Twist::ZERO };
@@ -99,7 +98,7 @@ pub mod tests {
     pub type Simulated<'w> = Robot<Nb<Controller<'w>>, &'w Simulation>;
 
     pub const WISH: Wish = Wish {
-        is_on: true,
+        is_on: Some(true),
         twist: Twist::new(0.5, 0.0, 0.0),
         angle: Angle::from_degrees(90.0),
         order: ShooterOrder::Rest,
@@ -137,7 +136,7 @@ pub mod tests {
         let world = Simulation::new(1);
         let (wheels, turret) = motors(&world);
         let mut robot = robot(&world, &STOP);
-        run(&world, &mut robot, 100, Wish { is_on: false, ..WISH });
+        run(&world, &mut robot, 100, Wish { is_on: Some(false), ..WISH });
         run(&world, &mut robot, 1_500, Wish { order: ShooterOrder::Spin, ..WISH });
         run(&world, &mut robot, 1_500, Wish { order: ShooterOrder::Fire(3), ..WISH });
         let speed = world.chassis().unwrap().twist.vx_m_s;

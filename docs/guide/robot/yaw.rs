@@ -19,9 +19,9 @@ pub const fn yaw() -> Config<Gm6020Voltage> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::switch::{Order, Switch};
     use drivetrain::dji::Bus;
     use drivetrain::encoder::Position;
+    use drivetrain::motor::{ArmingSwitch, SwitchOrder};
     use drivetrain::runner::{Nb, Runner};
     use drivetrain::sim::{MotorConfig, Simulation};
     use drivetrain::time::Duration;
@@ -34,15 +34,15 @@ mod tests {
         let mut bus = Bus::new();
         let yaw = bus.attach(yaw()).unwrap();
         let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
-        let mut switch = Switch::START;
+        let mut switch = ArmingSwitch::new();
         for ms in 0..4_000 {
             world.advance(Duration::from_millis(1));
             runner.poll(16);
             let Some(tick) = runner.due() else { continue };
             match switch.read(ms >= 100) {
-                Order::Arm => runner.arm(tick).unwrap(),
-                Order::Keep => {}
-                Order::Disarm => runner.device_mut().disarm(),
+                SwitchOrder::Arm => runner.arm(tick).unwrap(),
+                SwitchOrder::Keep => {}
+                SwitchOrder::Disarm => runner.device_mut().disarm(),
             }
             let degrees = if ms < 2_000 { 90.0 } else { 350.0 };
             let target = Position::from_angle(Angle::from_degrees(degrees));
