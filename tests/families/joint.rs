@@ -6,7 +6,8 @@ use drivetrain::control::PidConfig;
 use drivetrain::error::ConfigError;
 use drivetrain::math::wrap_pi;
 use drivetrain::motor::{
-    AngleDrive, Devices, Impedance, ImpedanceControl, Ingest, Link, Own, OwnMotor, TargetError,
+    AngleDrive, Condition, Devices, Impedance, ImpedanceControl, Ingest, Link, Own, OwnMotor,
+    TargetError,
 };
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{DamiaoDrive, Drive, DriveShaft, Line, RobStrideDrive, Simulation};
@@ -262,19 +263,19 @@ fn gains() -> ImpedanceControl {
 }
 
 /// Runs a joint at its zero whose drive loses its supply after a second and is dark for so long. Returns the angle of the joint before
-/// and after, and how far the shaft turned.
+/// and after, how far the shaft turned, and whether there was the edge of a fault.
 fn brown_out(
     model: robstride::Model,
     start: f32,
     (dark_ms, is_on): (u64, bool),
-) -> (Option<Angle>, Option<Angle>, f32) {
+) -> (Option<Angle>, Option<Angle>, f32, bool) {
     let world = Simulation::new(1);
     let mut drive = RobStrideDrive::of(model, 1).with_shaft(DriveShaft::new(0.05, 0.5));
     drive.shaft_mut().set_angle(start);
     let mode = ImpedanceControl::new(5.0).unwrap();
     let joint = Own::new(robstride::Motor::new(model, 1, mode).unwrap());
     let mut runner = Runner::new(Nb(world.controller()), world.clock(), joint);
-    let (mut before, mut turned) = (None, 0.0_f32);
+    let (mut before, mut turned, mut faults) = (None, 0.0_f32, false);
     for ms in 0..3_000_u64 {
         if ms == 1_000 {
             before = runner.device().angle(());
@@ -299,8 +300,11 @@ fn brown_out(
         let spring = Impedance { stiffness: 10.0, damping: 1.0, ..Impedance::FREE };
         _ = runner.device_mut().set_impedance(spring);
         runner.tick(tick);
+        while let Some(edge) = runner.device_mut().next_edge() {
+            faults |= edge.condition == Condition::Fault && edge.began;
+        }
     }
-    (before, runner.device().angle(()), turned)
+    (before, runner.device().angle(()), turned, faults)
 }
 
 #[test]
@@ -309,14 +313,16 @@ fn a_drive_that_starts_again_at_once_keeps_the_joint_where_it_is_or_loses_its_ze
         for is_on in [true, false] {
             let case = format!("dark for {dark_ms} ms, armed: {is_on}");
             // Beyond half a turn of the drive, which is lost.
-            let (before, after, turned) = brown_out(robstride::Model::RS03, 3.6, (dark_ms, is_on));
+            let (before, after, turned, _) =
+                brown_out(robstride::Model::RS03, 3.6, (dark_ms, is_on));
             let off = |angle: Option<Angle>| angle.unwrap().as_radians().abs();
             assert!(off(before) < 0.01 && off(after) < 0.01, "{case}: {after:?}");
             assert!(turned < 0.05, "{case}: the shaft turned by {turned} rad");
             // The CyberGear counts from where it is switched on.
-            let (before, after, turned) =
+            let (before, after, turned, faults) =
                 brown_out(robstride::Model::CYBERGEAR, 1.5, (dark_ms, is_on));
             assert!(off(before) < 0.01 && after.is_none(), "{case}: {after:?}");
+            assert!(faults || dark_ms > 100, "{case}: no edge"); // lost feedback has its own
             assert!(turned < 0.05, "{case}: the shaft turned by {turned} rad");
         }
     }

@@ -6,7 +6,7 @@ use drivetrain::runner::{AbortPending, Nb, NbAbort};
 use drivetrain::time::Instant;
 use embassy_stm32::can::{self, BufferedCanReceiver, BufferedCanSender, Can};
 use embassy_stm32::{Config, pac, rcc, time::Hertz};
-use embedded_can::{ErrorKind, StandardId};
+use embedded_can::{ErrorKind, ExtendedId, Id, StandardId};
 
 /// A loop that stands for so long is reset, and comes back disarmed. The watchdog's own oscillator is up to half off.
 pub const WATCHDOG_US: u32 = 20_000;
@@ -57,7 +57,7 @@ impl AbortPending for Halves {
                 }
                 is_empty = false;
                 let held = self.registers.tx(mailbox);
-                let id = StandardId::new(held.tir().read().stid()).unwrap_or(StandardId::MAX);
+                let (id, is_remote) = header(held.tir().read().0);
                 let length = held.tdtr().read().dlc();
                 let words = [held.tdlr().read().0, held.tdhr().read().0];
                 // One that is on the wire is free at the end of this attempt, 0.14 ms at most, and only then it is known
@@ -72,7 +72,7 @@ impl AbortPending for Halves {
                     continue;
                 }
                 let [[a, b, c, d], [e, f, g, h]] = words.map(u32::to_le_bytes);
-                let header = can::frame::Header::new(id.into(), length, false);
+                let header = can::frame::Header::new(id, length, is_remote);
                 let bytes = [a, b, c, d, e, f, g, h];
                 if let Ok(frame) = can::Frame::new(header, &bytes) {
                     back(frame);
@@ -83,6 +83,14 @@ impl AbortPending for Halves {
             }
         }
     }
+}
+
+/// Reads id and kind of a frame in the register TIR of its mailbox: 29 bits from bit 3 on if bit 2 is set, 11 bits from bit 21 on
+/// otherwise; bit 1 is set for a remote frame (RM0090, 32.9.3).
+fn header(tir: u32) -> (Id, bool) {
+    let standard = || StandardId::new((tir >> 21) as u16).unwrap_or(StandardId::MAX).into();
+    let extended = || ExtendedId::new(tir >> 3).unwrap_or(ExtendedId::MAX).into();
+    (if tir & 1 << 2 == 0 { standard() } else { extended() }, tir & 1 << 1 != 0)
 }
 
 /// Switches on a controller whose filters are set, with 1 Mbit/s. `registers` are its own.
