@@ -101,7 +101,7 @@ impl Robot {
                 let host = u8::try_from(host.unwrap_or(0xFD)).map_err(|_| "a host id is a byte")?;
                 (Kind::RobStride(Own::new(motor.with_host_id(host)?)), SPEED)
             }
-            // The loop of the drive, here and below. For RMD and VESC the drive alone limits the torque.
+            // The loop of the drive, here and below. For RMD, VESC and LK V2.35 the drive alone limits the torque.
             Model::Lk(model) => {
                 let nm = GENTLE * model.max_torque_nm();
                 let mode = lk::Mode::velocity_with_torque_limit(SPEED, nm);
