@@ -9,7 +9,7 @@ use crate::judge::end_with_zeros;
 use drivetrain::damiao::Model;
 use drivetrain::sim::{DamiaoDrive, Drive, MotorConfig, MotorKey, Simulation};
 use drivetrain::units::AngularVelocity;
-use socketcan::{CanFrame, CanSocket, EmbeddedFrame, Socket, StandardId};
+use socketcan::{CanFilter, CanFrame, CanSocket, EmbeddedFrame, Socket, SocketOptions, StandardId};
 use std::fs;
 use std::io::{BufRead, Write};
 use std::process::{Command, Stdio};
@@ -253,6 +253,8 @@ fn the_example_socketcan_turns_a_damiao_beside_an_m3508() {
     let world = Simulation::new(7);
     world.attach(MotorConfig::m3508(1)).unwrap();
     let mut robot = Robot::on(FAR, world);
+    // The three mailboxes of the simulated controller are for commands to the M3508.
+    robot.socket.set_filters(&[CanFilter::new(0x200, 0x7FF)]).unwrap();
     let socket = CanSocket::open(FAR).unwrap();
     socket.set_nonblocking(true).unwrap();
     let mut drive = DamiaoDrive::of(Model::J4310, 1);
