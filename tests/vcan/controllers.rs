@@ -6,11 +6,14 @@ use super::{
 };
 use crate::ends::{ends, is_there, signal};
 use crate::judge::end_with_zeros;
-use drivetrain::sim::{MotorConfig, MotorKey, Simulation};
-use socketcan::{CanFrame, CanSocket, EmbeddedFrame, Socket, StandardId};
+use drivetrain::damiao::Model;
+use drivetrain::sim::{DamiaoDrive, Drive, MotorConfig, MotorKey, Simulation};
+use drivetrain::units::AngularVelocity;
+use socketcan::{CanFilter, CanFrame, CanSocket, EmbeddedFrame, Socket, SocketOptions, StandardId};
 use std::fs;
 use std::io::{BufRead, Write};
-use std::process::Command;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
 
 /// The interface of the bench.
 const NEAR: &str = "can0";
@@ -228,7 +231,7 @@ fn the_example_socketcan_turns_a_motor_and_leaves_it_at_zero() {
         Command::new(std::env::var("VCAN_EXAMPLE").unwrap()).arg(NEAR).spawn().unwrap();
     let mut millisecond = || {
         robot.feed_back();
-        std::thread::sleep(std::time::Duration::from_millis(1));
+        std::thread::sleep(Duration::from_millis(1));
         robot.world.motor(motor).unwrap().velocity.as_rpm()
     };
     wait_until("a motor that turns", || millisecond() > 27.0);
@@ -241,4 +244,54 @@ fn the_example_socketcan_turns_a_motor_and_leaves_it_at_zero() {
     robot.mark(&Witness::on(NEAR), END, 0);
     robot.receive();
     end_with_zeros(&robot.received, &["200"]);
+}
+
+/// To its own end after 5 s, with a drive that only answers on a socket of its own.
+#[test]
+#[ignore = "needs can0 and can1 on one bus: tests/vcan/run starts a Linux that has them"]
+fn the_example_socketcan_turns_a_damiao_beside_an_m3508() {
+    let world = Simulation::new(7);
+    world.attach(MotorConfig::m3508(1)).unwrap();
+    let mut robot = Robot::on(FAR, world);
+    // The three mailboxes of the simulated controller are for commands to the M3508.
+    robot.socket.set_filters(&[CanFilter::new(0x200, 0x7FF)]).unwrap();
+    let socket = CanSocket::open(FAR).unwrap();
+    socket.set_nonblocking(true).unwrap();
+    let mut drive = DamiaoDrive::of(Model::J4310, 1);
+    let (mut fastest, mut before) = (0.0_f32, Instant::now());
+    let mut example = Command::new(std::env::var("VCAN_EXAMPLE").unwrap())
+        .args([NEAR, "--motors", "m3508:1,damiao4310:1"])
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    wait_until("the end of the example", || {
+        robot.feed_back();
+        while let Ok(frame) = socket.read_frame() {
+            let frame = drivetrain::frame::CanFrame::copy_of(&frame).unwrap();
+            if let Some(answer) = drive.hear(&frame) {
+                socket.write_frame(&answer.convert::<CanFrame>().unwrap()).unwrap();
+            }
+        }
+        let now = Instant::now();
+        drive.step(now.duration_since(before).as_secs_f32());
+        before = now;
+        fastest = fastest.max(drive.shaft().velocity_rad_per_s());
+        std::thread::sleep(Duration::from_millis(1));
+        example.try_wait().unwrap().is_some()
+    });
+    let output = example.wait_with_output().unwrap();
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(output.status.success(), "{said}");
+    for name in ["M3508 #1: ", "DM-J4310 #1: "] {
+        let rpm = said.lines().find_map(|line| line.strip_prefix(name)?.strip_suffix(" rpm"));
+        let rpm: f32 = rpm.unwrap_or_else(|| panic!("no {name} in {said}")).parse().unwrap();
+        assert!((rpm - 30.0).abs() < 3.0, "{said}");
+    }
+    let fastest = AngularVelocity::from_rad_per_s(fastest).as_rpm();
+    assert!((27.0..45.0).contains(&fastest), "{fastest} rpm");
+    assert!(!drive.is_enabled() && drive.shaft().torque_nm() == 0.0);
+    robot.mark(&Witness::on(NEAR), END, 0);
+    robot.receive();
+    end_with_zeros(&robot.received, &["200"]);
+    print!("{said}");
 }
