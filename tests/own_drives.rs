@@ -811,3 +811,38 @@ fn of_several_frames_that_enable_a_drive_the_one_given_back_comes_again() {
     let told: Vec<u8> = power(1..=35, || bench.live()).into_iter().map(|(_, byte)| byte).collect();
     assert_eq!(told, [7, 1, 7, 1]);
 }
+
+/// A frame without a place is offered again as it was taken last, once, and no other frame is.
+#[test]
+fn what_is_put_back_is_the_frame_that_was_taken_last() {
+    fn update(bench: &mut Bench) {
+        bench.ms += 1;
+        bench.hear();
+        bench.own.set_torque(2.0).unwrap();
+        let tick = bench.tick();
+        bench.own.update(tick);
+    }
+    fn again(bench: &mut Bench) -> CanFrame {
+        let frame = bench.own.next_frame(0).unwrap();
+        let mut data = frame.data().to_vec();
+        data.push(9);
+        let other = <CanFrame as Frame>::new(frame.id(), &data).unwrap();
+        assert!(!bench.own.put_back(&other), "never offered");
+        assert!(bench.own.put_back(&frame));
+        assert!(!bench.own.put_back(&frame), "waits already");
+        assert_eq!(bench.own.next_frame(0), Some(frame));
+        frame
+    }
+    let mut bench = Bench::armed(Tool::POWERED, Report::Always(false));
+    update(&mut bench);
+    let enable = again(&mut bench);
+    assert_eq!(enable, CanFrame::of(id(0x304), [1]));
+    bench.drain();
+    update(&mut bench);
+    assert!(!bench.own.put_back(&enable), "of the update before");
+    let mut bench = Bench::driving(Tool::POWERED, Report::Follows);
+    update(&mut bench);
+    let command = again(&mut bench);
+    assert_eq!(command.id(), id(0x301));
+    assert_eq!(bench.own.next_frame(0), None);
+}
