@@ -1,6 +1,6 @@
-//! Reasons against arming: missing motors, settings that differ, and all others.
+//! Reasons against arming: missing motors, settings that differ, and all others; and the order in which a request is refused.
 
-use super::{BusLoad, Claim, MotorName};
+use super::{BusLoad, Claim, Guard, MotorName};
 
 /// The motors that prevent arming, by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,9 +17,17 @@ impl Missing {
 
     /// Collects names; `None` without any.
     pub fn collect(names: impl Iterator<Item = MotorName>) -> Option<Self> {
+        Self::of(names).some()
+    }
+
+    pub(crate) fn of(names: impl Iterator<Item = MotorName>) -> Self {
         let mut missing = Self::NONE;
         names.for_each(|name| missing.add(name));
-        (missing.total > 0).then_some(missing)
+        missing
+    }
+
+    fn some(self) -> Option<Self> {
+        (self.total > 0).then_some(self)
     }
 
     pub(super) const NONE: Self = Self { names: [None; Self::CAPACITY], total: 0, full_bus: None };
@@ -118,6 +126,86 @@ impl core::fmt::Display for ArmError {
 }
 
 impl core::error::Error for ArmError {}
+
+impl ArmError {
+    /// Returns the refusal for a reason around the devices: a set emergency stop, or a driver that takes no frames.
+    pub(crate) const fn around(is_stopped: bool, is_bus_down: bool) -> Option<Self> {
+        if is_stopped {
+            Some(Self::Stopped)
+        } else if is_bus_down {
+            Some(Self::BusDown)
+        } else {
+            None
+        }
+    }
+}
+
+/// What stands against arming some motors, beside the emergency stop.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Obstacles {
+    pub(crate) has_motors: bool,
+    pub(crate) clash: Option<(Claim, Claim)>,
+    pub(crate) missing: Missing,
+    pub(crate) second_master: Option<Claim>,
+    pub(crate) faulty: Missing,
+    pub(crate) wrong_setting: Option<WrongSetting>,
+}
+
+impl Obstacles {
+    /// Nothing stands against arming one motor.
+    pub(crate) const NONE: Self = Self {
+        has_motors: true,
+        clash: None,
+        missing: Missing::NONE,
+        second_master: None,
+        faulty: Missing::NONE,
+        wrong_setting: None,
+    };
+
+    /// Returns the first of the reasons against a request to arm, in the order of all devices: the emergency stop, no motor, a clash of
+    /// ids, another setting, missing feedback, a second master, a fault, a setting not known yet, and a request that is
+    /// [not granted](crate::motor::safety::DeviceGuard::ask). If the stop is set, `obstacles` is not called.
+    ///
+    /// # Errors
+    /// That reason.
+    pub(crate) fn check(
+        is_stopped: bool,
+        granted: bool,
+        obstacles: impl FnOnce() -> Self,
+    ) -> Result<(), ArmError> {
+        match ArmError::around(is_stopped, false) {
+            Some(refusal) => Err(refusal),
+            None => obstacles().refusal(granted).map_or(Ok(()), Err),
+        }
+    }
+
+    /// As [`check`](Self::check) for one motor outside of the devices: takes the request. `missing` is the motor, if its feedback is
+    /// [missing](Guard::is_missing).
+    ///
+    /// # Errors
+    /// That reason.
+    pub(crate) fn check_one(guard: &mut Guard, missing: Option<MotorName>) -> Result<(), ArmError> {
+        let (granted, is_stopped) = (guard.ask(), guard.is_stopped());
+        let missing = Missing::of(missing.into_iter());
+        Self::check(is_stopped, granted, || Self { missing, ..Self::NONE })
+    }
+
+    fn refusal(self, granted: bool) -> Option<ArmError> {
+        if !self.has_motors {
+            return Some(ArmError::NoMotors);
+        }
+        let clash = self.clash.map(|(one, other)| ArmError::Clash(one, other));
+        // A drive set up for other commands may answer none of ours.
+        let differs = self.wrong_setting.filter(|wrong| wrong.found.is_some());
+        clash
+            .or_else(|| differs.map(ArmError::Setting))
+            .or_else(|| self.missing.some().map(ArmError::Missing))
+            .or_else(|| self.second_master.map(ArmError::SecondMaster))
+            .or_else(|| self.faulty.some().map(ArmError::Faulty))
+            .or_else(|| self.wrong_setting.map(ArmError::Setting))
+            .or_else(|| (!granted).then_some(ArmError::NotReleased))
+    }
+}
 
 /// A setting of a drive that prevents arming: the setting differs from the expected value, or is not known.
 ///

@@ -1,6 +1,6 @@
 //! A device, and actions on every device of several: one visitor for each action.
 
-use super::{Claim, Condition, Devices, Missing, MotorName, Role, WrongSetting};
+use super::{Claim, Condition, Devices, MotorName, Obstacles, Role, WrongSetting};
 use crate::frame::CanFrame;
 use crate::time::{Edge, Instant, Tick};
 use core::ops::Range;
@@ -277,21 +277,20 @@ impl Visitor for Rival {
     }
 }
 
-pub(super) struct Obstacles {
+/// Collects what stands against arming.
+pub(super) struct Survey {
     pub(super) now: Instant,
-    pub(super) missing: Missing,
-    pub(super) second_master: Option<Claim>,
-    pub(super) faulty: Missing,
-    pub(super) wrong_setting: Option<WrongSetting>,
+    pub(super) found: Obstacles,
 }
 
-impl Visitor for Obstacles {
+impl Visitor for Survey {
     #[inline]
     fn visit(&mut self, device: &mut impl CanDevice) {
-        device.missing(self.now).for_each(|motor| self.missing.add(motor));
-        device.faulty().for_each(|motor| self.faulty.add(motor));
-        self.wrong_setting = self.wrong_setting.or_else(|| device.wrong_setting());
-        self.second_master = self.second_master.or_else(|| device.second_master());
+        let found = &mut self.found;
+        device.missing(self.now).for_each(|motor| found.missing.add(motor));
+        device.faulty().for_each(|motor| found.faulty.add(motor));
+        found.wrong_setting = found.wrong_setting.or_else(|| device.wrong_setting());
+        found.second_master = found.second_master.or_else(|| device.second_master());
     }
 }
 

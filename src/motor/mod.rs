@@ -44,6 +44,7 @@ mod own;
 mod safety;
 mod watch;
 
+pub(crate) use arming::Obstacles;
 pub use arming::{ArmError, Missing, WrongSetting};
 pub use capability::{Capabilities, Capability};
 pub use claim::{Claim, MotorName, Role};
@@ -64,7 +65,7 @@ pub(crate) use own::{
 pub use own::{Impedance, ImpedanceControl, Inquiry, Order, Own, OwnMotor, Settings, Target};
 pub use safety::OPENING;
 pub(crate) use safety::{
-    Ages, DeviceGuard, Hold, LONGEST_PAUSE, MotorGuard, Rest, age, is_near, take_age,
+    Ages, DeviceGuard, Hold, LONGEST_PAUSE, MotorGuard, Repeat, Rest, age, is_near, take_age,
 };
 pub(crate) use watch::Watch;
 pub use watch::{Severity, Vitals};

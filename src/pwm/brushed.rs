@@ -5,7 +5,8 @@ use super::rc::duty;
 use crate::control::Pid;
 use crate::error::ConfigError;
 use crate::motor::{
-    ArmError, Capabilities, Capability, Guard, Link, Missing, TargetError, VelocityDrive, Watch,
+    ArmError, Capabilities, Capability, Guard, Link, Obstacles, Repeat, TargetError, VelocityDrive,
+    Watch,
 };
 use crate::time::{Instant, Tick, TimeStep};
 use crate::units::AngularVelocity;
@@ -91,8 +92,7 @@ pub struct Brushed<P, D> {
     output: f32,
     /// The last update set a duty of its own; the loop continues from there.
     was_direct: bool,
-    /// An update without a step may set the output once more.
-    may_hold: bool,
+    may_repeat: Repeat,
     counted: Option<(u32, Instant)>,
     counts: i64,
     rad_per_s: f32,
@@ -120,7 +120,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
             way: Way::Coast,
             output: 0.0,
             was_direct: false,
-            may_hold: false,
+            may_repeat: Repeat::NO,
             counted: None,
             counts: 0,
             rad_per_s: 0.0,
@@ -156,17 +156,8 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     /// # Errors
     /// When the emergency stop is set, or no counts came.
     pub fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
-        let granted = self.guard.ask();
-        if self.guard.is_stopped() {
-            return Err(ArmError::Stopped);
-        }
         let missing = self.guard.is_missing(now).then_some(self.config.name);
-        if let Some(missing) = Missing::collect(missing.into_iter()) {
-            return Err(ArmError::Missing(missing));
-        }
-        if !granted {
-            return Err(ArmError::NotReleased);
-        }
+        Obstacles::check_one(&mut self.guard, missing)?;
         if self.guard.engage(now) {
             self.watch.start(&mut self.guard, now);
             self.rest();
@@ -257,18 +248,18 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     }
 
     fn command(&mut self, tick: Tick) -> f32 {
-        if !self.guard.drives(tick.now()) {
+        let (drives, step) = (self.guard.drives(tick.now()), TimeStep::of_motor(tick.dt_s()));
+        let may_drive = self.may_repeat.drives(drives, step.is_hold());
+        if !drives {
             // Late counts leave the integral unchanged; without a target it starts afresh.
             if !self.guard.has_target() {
                 self.rest();
             }
             return 0.0;
         }
-        let step = TimeStep::of_motor(tick.dt_s());
         if step.is_hold() {
-            return if core::mem::take(&mut self.may_hold) { self.output } else { 0.0 };
+            return if may_drive { self.output } else { 0.0 };
         }
-        self.may_hold = true;
         let is_direct = matches!(self.target, Target::Duty(_));
         let was_direct = core::mem::replace(&mut self.was_direct, is_direct);
         match (self.target, &mut self.speed) {
@@ -290,9 +281,10 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     }
 
     fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
+        self.may_repeat.end_without(self.guard.has_target());
         if !self.guard.has_target() {
             // The target before and its output are discarded.
-            (self.target, self.may_hold, self.was_direct) = (Target::Rest, false, false);
+            (self.target, self.was_direct) = (Target::Rest, false);
         }
         self.guard.admit(is_finite)
     }

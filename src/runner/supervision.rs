@@ -69,11 +69,8 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// Names the reason, as [`Devices::arm`]; also a watched emergency stop, and a driver that takes no frames. If motors are
     /// missing on a full bus, the error has the [measured load](Self::measured_load). A refused call counts as a request.
     pub fn arm(&mut self, tick: Tick) -> Result<(), ArmError> {
-        let refusal = if self.stop.is_some_and(EmergencyStop::is_set) {
-            ArmError::Stopped
-        } else if self.is_bus_down() {
-            ArmError::BusDown
-        } else {
+        let is_stopped = self.stop.is_some_and(EmergencyStop::is_set);
+        let Some(refusal) = ArmError::around(is_stopped, self.is_bus_down()) else {
             return self.device.arm(tick.now()).map_err(|refusal| match refusal {
                 ArmError::Missing(missing) => ArmError::Missing(missing.on_bus(self.meter.last())),
                 other => other,

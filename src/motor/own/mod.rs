@@ -279,7 +279,7 @@ impl<M: OwnMotor> Own<M> {
             return Err(TargetError::Unsupported);
         }
         // Where there was no target, the command is of one before.
-        self.offered.may_repeat &= self.guard.has_target();
+        self.offered.may_repeat.end_without(self.guard.has_target());
         let of_drive = self.joint.target_of_drive(target);
         self.guard.admit(of_drive.unwrap_or(target).is_finite())?;
         self.target = of_drive.inspect_err(|_| self.guard.relax())?;

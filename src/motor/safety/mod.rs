@@ -6,7 +6,7 @@
 //! | question | decided by | if not |
 //! |---|---|---|
 //! | did time move on since the previous update, and is the update not before the arming? | `DeviceGuard::moves_on` | zeros in this cycle, all motors trip |
-//! | is the time step usable? | `DeviceGuard::hold` | the last commands once, then zeros |
+//! | is the time step usable? | `DeviceGuard::hold`, [`Repeat`] | the last commands once, then zeros |
 //! | is the feedback fresh? | `MotorGuard::age` | late: zero until the next feedback; offline: relaxed and latched |
 //! | is the motor armed, by a gesture? | `MotorGuard::admit`, `DeviceGuard::begin_arming` | no target is taken |
 //! | is there a target that is not expired? | `MotorGuard::age` | relaxed |
@@ -68,6 +68,43 @@ pub(crate) enum Rest {
     Pause,
     /// There was no target: the loops start afresh.
     Relaxed,
+}
+
+/// Whether an update without a usable step may repeat the last command: the first after a command, and no other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Repeat(bool);
+
+impl Repeat {
+    /// There is no command to repeat.
+    pub(crate) const NO: Self = Self(false);
+    /// The last update gave a command.
+    pub(crate) const ONCE: Self = Self(true);
+
+    /// After so many updates in a row without a usable step.
+    const fn after(held_steps: u8) -> Self {
+        Self(held_steps == 0)
+    }
+
+    /// After an update, which drove the motor or not, with a usable step or without.
+    pub(crate) const fn after_update(drove: bool, is_hold: bool) -> Self {
+        Self(drove && !is_hold)
+    }
+
+    pub(crate) const fn is_allowed(self) -> bool {
+        self.0
+    }
+
+    /// Tells whether an update may drive the motor, and notes the update.
+    pub(crate) const fn drives(&mut self, may_drive: bool, is_hold: bool) -> bool {
+        let drives = may_drive && (!is_hold || self.is_allowed());
+        *self = Self::after_update(drives, is_hold);
+        drives
+    }
+
+    /// Allows no repetition if there is no target: the command is of an earlier one.
+    pub(crate) const fn end_without(&mut self, has_target: bool) {
+        self.0 &= has_target;
+    }
 }
 
 /// Longest pause between two checks for which a 32-bit stamp still represents an age.
