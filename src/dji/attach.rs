@@ -1,10 +1,10 @@
 //! Attaching, arming and detaching of motors, the conditions that forbid arming, and the load of the bus.
 
 use super::config::PlainConfig;
-use super::motors::{FIRST_FEEDBACK_ID, Key, Motors};
+use super::motors::{FIRST_FEEDBACK_ID, Motors};
 use super::outbox::{Outbox, Place};
 use super::slot::config::configured;
-use super::slot::{Slot, health};
+use super::slot::{Key, Slot, health};
 use super::{AttachError, Facts};
 use crate::motor::{ArmError, BusLoad, Claim, Condition, Missing, MotorName, Obstacles, Role};
 use crate::time::Instant;

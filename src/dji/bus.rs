@@ -1,6 +1,7 @@
 use super::attach::Budget;
-use super::motors::{FIRST_FEEDBACK_ID, IDS, Key, Motors, is_of_others};
+use super::motors::{FIRST_FEEDBACK_ID, IDS, Motors, is_of_others};
 use super::outbox::Outbox;
+use super::slot::Key;
 use super::watch::{Counters, Rejects};
 use super::{AnyHandle, AttachError, Config, Feedback, Handle, Model, attach, watch};
 use crate::frame::CanFrame;

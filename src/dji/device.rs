@@ -114,6 +114,12 @@ impl Default for Bus {
     }
 }
 
+#[cfg(target_pointer_width = "32")]
+const _: () = {
+    assert!(size_of::<super::slot::Slot>() <= 296 && size_of::<Bus>() <= 3600);
+    assert!(size_of::<Bus<(), 8>>() <= 2800 && size_of::<Bus<(), 1>>() <= 640);
+};
+
 impl<M: Model, B, const N: usize> VelocityDrive<Handle<M, B>> for Bus<B, N> {
     fn velocity(&self, motor: Handle<M, B>) -> Option<AngularVelocity> {
         velocity(self, motor.into())

@@ -1,9 +1,8 @@
-//! Targets of a new kind, and loops outside the usual path.
+//! Targets, and the loops from a target to the raw command.
 
-use super::{Goal, Slot, health, needs};
+use super::{Action, Duty, Goal, Key, Slot};
 use crate::control::Pid;
-use crate::dji::codec::{saturate, to_raw};
-use crate::dji::model::Range;
+use crate::dji::codec::{Range, free_to_raw, loop_to_raw, saturate, to_raw};
 use crate::dji::outbox::Outbox;
 use crate::encoder::Position;
 use crate::motor::{Link, MotorGuard, Rest, TargetError, Timeouts};
@@ -15,6 +14,41 @@ impl Slot {
     pub(in crate::dji) fn relax(&mut self) {
         self.guard.relax();
         self.apply_rules();
+    }
+
+    /// Replaces a target in rad/s of the output shaft by another: a motor with such a target is armed and has a loop.
+    #[inline]
+    pub(in crate::dji) fn renew_velocity(&mut self, motor: Key, rad_per_s: f32, now: u32) -> bool {
+        let goes_on = self.asked == Action::Velocity
+            && self.guard.link() == Link::Online
+            && self.generation == motor.generation()
+            && rad_per_s.is_finite();
+        if goes_on {
+            self.goal.value = rad_per_s.to_bits().cast_signed();
+            self.guard.renew_target(now);
+        }
+        goes_on
+    }
+
+    /// Replaces a target in turns and angle of the output shaft by another, without soft limits.
+    #[inline]
+    pub(in crate::dji) fn renew_position(
+        &mut self,
+        motor: Key,
+        position: Position,
+        now: u32,
+    ) -> bool {
+        let goes_on = self.asked == Action::Position
+            && self.guard.link() == Link::Online
+            && self.generation == motor.generation()
+            && position.is_finite()
+            && self.health.soft_limits.is_none();
+        if goes_on {
+            let (turns, phase) = self.shaft.locate(position);
+            self.goal = Goal { turns: self.shaft.near(turns), value: phase };
+            self.guard.renew_target(now);
+        }
+        goes_on
     }
 
     /// Takes rad/s of the output shaft.
@@ -163,7 +197,7 @@ impl Slot {
         }
         let is_online = self.guard.link() == Link::Online;
         if !self.guard.latch().active().is_empty() || self.guard.is_opening() {
-            health::require_check(self);
+            self.require_check();
         }
         let is_free = self.range == Range::within(self.full_limit) && self.speed.core.is_plain();
         self.duty = match self.asked {
@@ -176,6 +210,40 @@ impl Slot {
             Action::Position if is_free && self.position.is_plain() => Duty::Position,
             _ => Duty::Other,
         };
+    }
+
+    // Update.
+
+    /// Runs the loops of this motor and returns its raw command. `step` is the step of `dt_s`: only the usual path uses `step`, so the step
+    /// stays in registers.
+    #[inline(always)]
+    pub(in crate::dji) fn update(&mut self, step: &TimeStep, dt_s: f32, sent: &Outbox) -> i16 {
+        let velocity = self.velocity().as_rad_per_s();
+        let goal = match self.duty {
+            Duty::Velocity => self.goal.rad_per_s(),
+            Duty::Position => {
+                let way = self.shaft.way_to(self.goal.turns(), self.goal.phase());
+                match self.position.plain(way, velocity, step) {
+                    Ok(goal) => goal,
+                    Err(_) => return self.update_carefully(dt_s, sent),
+                }
+            }
+            Duty::Raw => return saturate(self.goal.raw(), self.range),
+            // Out of line too: inline, every update of every motor would load a zero for these.
+            Duty::Rest | Duty::First | Duty::Other => return self.update_carefully(dt_s, sent),
+        };
+        match self.speed.plain(goal, velocity, step) {
+            Ok(output) => free_to_raw(output, self.raw_per_unit),
+            Err(_) => self.follow_velocity(goal, velocity, dt_s),
+        }
+    }
+
+    // Cold, so that the usual path runs straight on. Loops with options also come here, with no other cost.
+    #[cold]
+    #[inline(never)]
+    fn follow_velocity(&mut self, goal: f32, velocity: f32, dt_s: f32) -> i16 {
+        let output = self.speed.step(goal, velocity, &TimeStep::of_motor(dt_s));
+        loop_to_raw(output, self.raw_per_unit, self.range)
     }
 
     // Cold, so that the usual path of an update runs straight on.
@@ -291,47 +359,10 @@ impl Slot {
     pub(in crate::dji) const fn speed_loop_mut(&mut self) -> &mut Pid {
         &mut self.speed
     }
-
-    pub(super) fn direction(&self) -> f32 {
-        1.0_f32.copysign(self.raw_per_unit)
-    }
 }
 
-/// Action set by the target of a motor.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub(super) enum Action {
-    Rest,
-    Raw,
-    Velocity,
-    /// By the shortest way.
-    Angle,
-    Position,
-    /// By the remaining way that another sensor measures.
-    Measured,
-}
-
-impl Action {
-    /// Tells whether the action goes to a position of the shaft.
-    pub(super) const fn is_way(self) -> bool {
-        matches!(self, Self::Angle | Self::Position)
-    }
-}
-
-/// Task of an update: the action itself in the usual, simple case.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub(super) enum Duty {
-    Rest,
-    /// The first run of any action since a rest.
-    First,
-    Raw,
-    /// The speed loop, plain and with the full output: its own limit is enough.
-    Velocity,
-    /// Both loops, as above.
-    Position,
-    /// Any other action, within the available output; also the first run of an action in place of another.
-    Other,
+fn needs(is_there: bool) -> Result<(), TargetError> {
+    if is_there { Ok(()) } else { Err(TargetError::NoLoop) }
 }
 
 #[cfg(test)]
