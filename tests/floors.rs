@@ -2,6 +2,7 @@
 
 #![cfg(test)]
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -464,7 +465,7 @@ fn inherent(text: &str) -> Vec<String> {
 
 #[test]
 fn the_inherent_methods_of_a_type_stand_in_at_most_two_files() {
-    let mut files = std::collections::BTreeMap::<(String, String), Vec<String>>::new();
+    let mut files = BTreeMap::<(String, String), Vec<String>>::new();
     for (module, path, text) in sources() {
         if path.components().any(|part| part.as_os_str() == "tests") {
             continue;
@@ -488,4 +489,387 @@ fn an_inherent_impl_is_told_from_that_of_a_trait() {
     assert_eq!(inherent("impl<M: Model<Command = Current>> Config<M> {"), ["Config"]);
     assert_eq!(inherent("impl super::Slot {\n}\nimpl Default for Bus {"), ["Slot"]);
     assert!(inherent("impl<D: Devices> Devices for &mut D {\nfn impl_it() {}").is_empty());
+}
+
+/// Words and signs of a text, without comments, strings, lifetimes and tests.
+fn tokens(text: &str) -> Vec<String> {
+    let text: String = code(text).flat_map(|line| [line, "\n"]).collect();
+    let letters: Vec<char> = text.chars().collect();
+    let at = |place: usize| letters.get(place).copied().unwrap_or('\n');
+    let (mut found, mut place) = (Vec::new(), 0);
+    while place < letters.len() {
+        let (begin, is_word) = (place, |c: char| c.is_alphanumeric() || c == '_');
+        match at(place) {
+            '/' if at(place + 1) == '/' => {
+                while at(place) != '\n' {
+                    place += 1;
+                }
+            }
+            '"' => {
+                place += 1;
+                while place < letters.len() && at(place) != '"' {
+                    place += if at(place) == '\\' { 2 } else { 1 };
+                }
+                place += 1;
+            }
+            '\'' if at(place + 1) == '\\' => place += 4,
+            '\'' if at(place + 2) == '\'' => place += 3,
+            '\'' => place += 1,
+            ':' if at(place + 1) == ':' => place += 2,
+            letter if is_word(letter) => {
+                while is_word(at(place)) {
+                    place += 1;
+                }
+            }
+            _ => place += 1,
+        }
+        let token: String = letters[begin..place.min(letters.len())].iter().collect();
+        if !token.starts_with(['/', '"', '\'']) && !token.trim().is_empty() || token == "/" {
+            found.push(token);
+        }
+    }
+    found
+}
+
+/// What stands around a definition.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Around {
+    /// An inherent `impl`, or a trait.
+    Methods,
+    /// The `impl` of a trait: its methods are defined by the trait.
+    OfTrait,
+    Module,
+    Body,
+}
+
+/// The items that a file defines, and the methods of its inherent `impl`s and traits.
+fn definitions(tokens: &[String]) -> (BTreeSet<String>, BTreeSet<String>) {
+    let (mut items, mut methods) = (BTreeSet::new(), BTreeSet::new());
+    let (mut around, mut next) = (Vec::new(), Around::Body);
+    for (place, token) in tokens.iter().enumerate() {
+        let word = |ahead: usize| tokens.get(place + ahead).map_or("", String::as_str);
+        let is_outside = around.iter().all(|around| *around == Around::Module);
+        let is_method = around.last() == Some(&Around::Methods);
+        match token.as_str() {
+            "impl" if is_outside => {
+                let header = tokens[place..].iter().take_while(|token| *token != "{");
+                let is_of_trait = header.into_iter().any(|token| token == "for");
+                next = if is_of_trait { Around::OfTrait } else { Around::Methods };
+            }
+            "trait" | "struct" | "enum" | "type" | "static" if is_outside => {
+                items.insert(word(1).to_owned());
+                next = if token == "trait" { Around::Methods } else { Around::Body };
+            }
+            "const" if is_outside && !["fn", "{", "_"].contains(&word(1)) => {
+                items.insert(word(1).to_owned());
+            }
+            "macro_rules" if is_outside => {
+                items.insert(word(2).to_owned());
+            }
+            "fn" => {
+                if is_outside {
+                    items.insert(word(1).to_owned());
+                } else if is_method {
+                    methods.insert(word(1).to_owned());
+                }
+                next = Around::Body;
+            }
+            "mod" if is_outside => next = Around::Module,
+            "{" => around.push(core::mem::replace(&mut next, Around::Body)),
+            "}" => _ = around.pop(),
+            ";" => next = Around::Body,
+            _ => {}
+        }
+    }
+    (items, methods)
+}
+
+/// The paths that a file names: those of each `use`, one for each leaf, and those in its code. Of a re-export, none.
+fn named_paths(tokens: &[String]) -> Vec<Vec<String>> {
+    let is_word = |token: &str| token.starts_with(|c: char| c.is_alphanumeric() || c == '_');
+    let (mut paths, mut place) = (Vec::new(), 0);
+    while place < tokens.len() {
+        if tokens[place] == "use" {
+            let end = place + tokens[place..].iter().take_while(|token| *token != ";").count();
+            let is_shown = place > 0 && (tokens[place - 1] == "pub" || tokens[place - 1] == ")");
+            if !is_shown {
+                leaves(&tokens[place + 1..end], &[], &mut |path, _| paths.push(path));
+            }
+            place = end;
+        } else if is_word(&tokens[place]) {
+            let (begin, mut path) = (place, vec![tokens[place].clone()]);
+            while tokens.get(place + 1).is_some_and(|token| token == "::")
+                && tokens.get(place + 2).is_some_and(|token| is_word(token))
+            {
+                place += 2;
+                path.push(tokens[place].clone());
+            }
+            // `pub(in crate::dji)` names no item.
+            if path.len() > 1 && !(begin > 0 && tokens[begin - 1] == "in" && path[0] == "crate") {
+                paths.push(path);
+            }
+        }
+        place += 1;
+    }
+    paths
+}
+
+/// Hands on each path of a tree of a `use`, and the name it brings in.
+fn leaves(tree: &[String], before: &[String], take: &mut dyn FnMut(Vec<String>, String)) {
+    let mut depth = 0;
+    let branches = tree.split(|token| {
+        depth += i32::from(token == "{") - i32::from(token == "}");
+        depth == 0 && token == ","
+    });
+    for branch in branches.filter(|branch| !branch.is_empty()) {
+        let open = branch.iter().position(|token| token == "{");
+        let (way, inner) = branch.split_at(open.unwrap_or(branch.len()));
+        let steps = way.iter().take_while(|token| *token != "as");
+        let mut path = before.to_vec();
+        path.extend(steps.filter(|token| *token != "::").cloned());
+        match inner {
+            [_, inner @ .., _] => leaves(inner, &path, take),
+            _ => {
+                path.pop_if(|last| last == "self");
+                let name = way.last().filter(|name| *name != "self").or(path.last()).cloned();
+                take(path, name.unwrap_or_default());
+            }
+        }
+    }
+}
+
+/// The path of a module below the crate: `dji/slot/gap`. Empty for `lib.rs`.
+type Module = Vec<String>;
+
+/// The file of a module.
+#[derive(Debug, Default)]
+struct File {
+    tokens: Vec<String>,
+    items: BTreeSet<String>,
+    methods: BTreeSet<String>,
+    /// The types with inherent methods here.
+    types: BTreeSet<String>,
+    /// The names brought in by a `use`, each with its path in the file.
+    brought: BTreeMap<String, Vec<String>>,
+}
+
+impl File {
+    fn of(text: &str) -> Self {
+        let tokens = tokens(text);
+        let (items, methods) = definitions(&tokens);
+        let mut brought = BTreeMap::new();
+        for (place, _) in tokens.iter().enumerate().filter(|(_, token)| *token == "use") {
+            let end = place + tokens[place..].iter().take_while(|token| *token != ";").count();
+            leaves(&tokens[place + 1..end], &[], &mut |path, name| _ = brought.insert(name, path));
+        }
+        Self { items, methods, types: inherent(text).into_iter().collect(), brought, tokens }
+    }
+}
+
+/// The place of a module below a folder: the first step of the way there, or `.` for the folder itself.
+fn node<'a>(folder: &[String], module: &'a Module) -> Option<&'a str> {
+    Some(module.strip_prefix(folder)?.first().map_or(".", String::as_str))
+}
+
+/// The files of a crate, by module.
+struct House(BTreeMap<Module, File>);
+
+impl House {
+    fn of_crate() -> Self {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+        let is_test = |path: &Path| path.iter().any(|part| part == "tests" || part == "tests.rs");
+        let files = rust_files(&root).into_iter().filter(|path| !is_test(path));
+        Self(
+            files
+                .map(|path| {
+                    let text = fs::read_to_string(&path).unwrap();
+                    let way = path.strip_prefix(&root).unwrap().with_extension("");
+                    let way = way.iter().map(|part| part.to_string_lossy().into_owned());
+                    let module = way.filter(|part| part != "mod" && part != "lib").collect();
+                    (module, File::of(&text))
+                })
+                .collect(),
+        )
+    }
+
+    /// The path from the root of the crate of a path in a file; `None` for a path of another crate.
+    fn absolute(&self, module: &[String], path: &[String]) -> Option<Module> {
+        let [first, rest @ ..] = path else { return None };
+        let mut here = module.to_vec();
+        match first.as_str() {
+            "crate" => return Some(rest.to_vec()),
+            "self" => {}
+            "super" => {
+                let ups = path.iter().take_while(|step| *step == "super").count();
+                here.truncate(module.len().checked_sub(ups)?);
+                return Some([&here, &path[ups..]].concat());
+            }
+            _ => {
+                let child = [module, &path[..1]].concat();
+                if self.0.contains_key(&child) {
+                    return Some([module, path].concat());
+                }
+                let way = self.0[module].brought.get(first).filter(|way| *way != path)?;
+                let way = self.absolute(module, way)?;
+                return Some([way.as_slice(), rest].concat());
+            }
+        }
+        Some([here.as_slice(), rest].concat())
+    }
+
+    /// The module whose file defines the item of a path from the root, through any number of re-exports.
+    fn home(&self, path: &[String]) -> Option<Module> {
+        let depth = (0..=path.len()).rev().find(|depth| self.0.contains_key(&path[..*depth]))?;
+        let (module, rest) = path.split_at(depth);
+        let Some(item) = rest.first() else { return Some(module.to_vec()) };
+        let file = &self.0[module];
+        if file.items.contains(item) {
+            return Some(module.to_vec());
+        }
+        let way = self.absolute(module, file.brought.get(item)?)?;
+        if way == path { None } else { self.home(&way) }
+    }
+
+    /// Which module names an item, or calls a method, of which other.
+    fn edges(&self) -> BTreeSet<(Module, Module)> {
+        let mut of_method = BTreeMap::<&String, Vec<&Module>>::new();
+        for (module, file) in &self.0 {
+            file.methods
+                .iter()
+                .for_each(|method| of_method.entry(method).or_default().push(module));
+        }
+        let mut found = BTreeSet::new();
+        for (module, file) in &self.0 {
+            let paths = named_paths(&file.tokens);
+            let homes = paths.iter().filter_map(|path| self.home(&self.absolute(module, path)?));
+            let mut used: BTreeSet<Module> = homes.collect();
+            for call in file.tokens.windows(4) {
+                let [of, dot, method, open] = call else { continue };
+                let is_call = (dot == "." || dot == "::") && open == "(";
+                let Some(homes) = of_method.get(method).filter(|_| is_call) else { continue };
+                let is_own = of == "self" || of == "Self";
+                if is_own && !file.methods.contains(method) {
+                    let shares = |other: &&&Module| !self.0[**other].types.is_disjoint(&file.types);
+                    used.extend(homes.iter().filter(shares).map(|home| (*home).clone()));
+                } else if let ([home], false) = (homes.as_slice(), is_own) {
+                    if dot == "." && !METHODS_OF_CORE.contains(&method.as_str()) {
+                        used.insert((*home).clone());
+                    }
+                }
+            }
+            found.extend(
+                used.into_iter()
+                    .filter(|other| other != module)
+                    .map(|other| (module.clone(), other)),
+            );
+        }
+        found
+    }
+
+    /// The circles among the files of each folder: the folder, and the files that use each other, directly or by others. A file counts
+    /// with the folder of its name; the file of the folder itself is `.`.
+    fn circles(&self) -> Vec<(String, String)> {
+        let edges = self.edges();
+        let mut circles = Vec::new();
+        for folder in self.0.keys() {
+            let mut reached = BTreeSet::new();
+            for (one, other) in &edges {
+                if let (Some(one), Some(other)) = (node(folder, one), node(folder, other)) {
+                    reached.insert((one, other));
+                }
+            }
+            loop {
+                let further: Vec<_> = reached
+                    .iter()
+                    .flat_map(|(one, by)| {
+                        let next = reached.iter().filter(move |(from, _)| from == by);
+                        next.map(move |(_, other)| (*one, *other))
+                    })
+                    .collect();
+                let before = reached.len();
+                reached.extend(further);
+                if reached.len() == before {
+                    break;
+                }
+            }
+            let nodes: BTreeSet<&str> = reached.iter().map(|(one, _)| *one).collect();
+            let with = |one: &str| -> Vec<&str> {
+                let both = |other: &&&str| {
+                    reached.contains(&(one, **other)) && reached.contains(&(**other, one))
+                };
+                nodes.iter().filter(both).copied().collect()
+            };
+            let groups: BTreeSet<Vec<&str>> = nodes.iter().map(|one| with(one)).collect();
+            let groups = groups.into_iter().filter(|group| group.len() > 1);
+            circles.extend(groups.map(|group| (folder.join("/"), group.join(" "))));
+        }
+        circles
+    }
+}
+
+/// Names of methods of `core` that one file of the crate has too.
+const METHODS_OF_CORE: [&str; 47] = [
+    "abs",
+    "add",
+    "all",
+    "and",
+    "any",
+    "as_str",
+    "chain",
+    "clear",
+    "contains",
+    "count",
+    "fill",
+    "filter",
+    "find",
+    "first",
+    "fold",
+    "get",
+    "get_mut",
+    "index",
+    "insert",
+    "is_empty",
+    "is_finite",
+    "iter",
+    "last",
+    "len",
+    "map",
+    "matches",
+    "max",
+    "min",
+    "next",
+    "nth",
+    "or",
+    "peek",
+    "pop",
+    "position",
+    "push",
+    "remove",
+    "replace",
+    "rev",
+    "saturating_add",
+    "set",
+    "skip",
+    "sort",
+    "sum",
+    "swap",
+    "take",
+    "then",
+    "zip",
+];
+
+#[test]
+fn show_circles() {
+    let house = House::of_crate();
+    for (folder, files) in house.circles() {
+        println!("{folder}: {files}");
+    }
+    if let Ok(folder) = std::env::var("FOLDER") {
+        for (one, other) in house.edges() {
+            let (one, other) = (one.join("/"), other.join("/"));
+            if one.starts_with(&folder) && other.starts_with(&folder) {
+                println!("  {one} -> {other}");
+            }
+        }
+    }
 }

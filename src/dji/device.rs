@@ -184,6 +184,6 @@ fn velocity<B, const N: usize>(bus: &Bus<B, N>, motor: AnyHandle<B>) -> Option<A
 
 /// Returns the measured angle of a motor that is online, if its absolute angle is known.
 fn angle<B, const N: usize>(bus: &Bus<B, N>, motor: AnyHandle<B>) -> Option<Angle> {
-    let state = bus.motors.get(motor.key())?.state()?;
+    let state = health::state(bus.motors.get(motor.key())?)?;
     (state.link == Link::Online && state.homing.is_known()).then(|| state.position.angle())
 }

@@ -1,21 +1,22 @@
-//! One motor in a tick: feedback and the short check.
+//! One motor in a tick: feedback, targets of the same kind, loops, and the short check.
 //!
-//! Targets, loops and less frequent tasks of a motor are in the files of the folder.
+//! Less frequent tasks of a motor are in the files of the folder.
 
 pub(super) mod config;
 pub(super) mod gap;
 pub(super) mod health;
 mod target;
 
-use super::codec::{Range, celsius};
+use super::codec::{Range, free_to_raw, loop_to_raw, saturate};
 use super::config::USUAL;
 use super::outbox::Place;
-use super::{Facts, Feedback, State};
+use super::{Facts, Feedback};
 use crate::control::{ErrorPid, Pid, PidConfig};
-use crate::encoder::{GearRatio, Homing, Shaft, shortest};
+use crate::encoder::{GearRatio, Homing, Position, Shaft, shortest};
 use crate::error::ConfigError;
 use crate::motor::{HealthConfig, Link, Monitor, MotorGuard, MotorName, Traffic};
-use crate::units::{AngularVelocity, Current};
+use crate::time::TimeStep;
+use crate::units::AngularVelocity;
 
 /// The refusal of a handle of a detached motor.
 pub(super) const DETACHED: ConfigError = ConfigError::Unusable("handle of a detached motor");
@@ -141,20 +142,8 @@ impl Goal {
         Self { turns: 0, value }
     }
 
-    const fn raw(&self) -> i32 {
-        self.value
-    }
-
     const fn rad_per_s(&self) -> f32 {
         f32::from_bits(self.value.cast_unsigned())
-    }
-
-    const fn phase(&self) -> i32 {
-        self.value
-    }
-
-    const fn turns(&self) -> u32 {
-        self.turns
     }
 
     /// A way in rad, and its rate in rad/s.
@@ -265,36 +254,6 @@ impl Slot {
         before + self.place.slot() + 1
     }
 
-    /// Returns the state; `None` before the first frame.
-    // Inline only: the compiler then drops the fields without a reader.
-    #[inline(always)]
-    pub(super) fn state(&self) -> Option<State> {
-        let facts = self.facts?;
-        if self.guard.link() == Link::Unheard {
-            return None;
-        }
-        let amperes =
-            self.direction() * f32::from(self.feedback.current()) * facts.current_full_scale_a
-                / f32::from(facts.current_raw);
-        Some(State {
-            motor: MotorName::new(facts.name, self.id(facts)),
-            position: self.shaft.position(),
-            homing: self.homing,
-            velocity: self.velocity(),
-            current: Current::from_amperes(amperes),
-            torque_nm: amperes * self.nm_per_a,
-            temperature_c: facts.has_temperature.then_some(celsius(self.feedback.temperature())),
-            error: facts.errors.read(self.feedback.error()),
-            rotor_counts: self.shaft.rotor_counts(),
-            ambiguous_gaps: self.ambiguous_gaps,
-            refused_targets: self.guard.refused_targets(),
-            forgotten_targets: self.guard.forgotten_targets(),
-            conditions: self.guard.latch().active(),
-            link: self.guard.link(),
-            feedback: self.feedback,
-        })
-    }
-
     fn direction(&self) -> f32 {
         1.0_f32.copysign(self.raw_per_unit)
     }
@@ -321,7 +280,72 @@ impl Slot {
         in_time
     }
 
-    // Checks.
+    // Targets.
+
+    /// Replaces a target in rad/s of the output shaft by another: a motor with such a target is armed and has a loop.
+    #[inline]
+    pub(super) fn renew_velocity(&mut self, motor: Key, rad_per_s: f32, now: u32) -> bool {
+        let goes_on = self.asked == Action::Velocity
+            && self.guard.link() == Link::Online
+            && self.generation == motor.generation()
+            && rad_per_s.is_finite();
+        if goes_on {
+            self.goal.value = rad_per_s.to_bits().cast_signed();
+            self.guard.renew_target(now);
+        }
+        goes_on
+    }
+
+    /// Replaces a target in turns and angle of the output shaft by another, without soft limits.
+    #[inline]
+    pub(super) fn renew_position(&mut self, motor: Key, position: Position, now: u32) -> bool {
+        let goes_on = self.asked == Action::Position
+            && self.guard.link() == Link::Online
+            && self.generation == motor.generation()
+            && position.is_finite()
+            && self.health.soft_limits.is_none();
+        if goes_on {
+            let (turns, phase) = self.shaft.locate(position);
+            self.goal = Goal { turns: self.shaft.near(turns), value: phase };
+            self.guard.renew_target(now);
+        }
+        goes_on
+    }
+
+    // Update.
+
+    /// Runs the loops of this motor and returns its raw command; `None` outside of the usual path, where the caller
+    /// [updates carefully](Self::update_carefully). `step` is the step of `dt_s`: only the usual path uses `step`, so the step stays in
+    /// registers.
+    #[inline(always)]
+    pub(super) fn update(&mut self, step: &TimeStep, dt_s: f32) -> Option<i16> {
+        let velocity = self.velocity().as_rad_per_s();
+        let goal = match self.duty {
+            Duty::Velocity => self.goal.rad_per_s(),
+            Duty::Position => {
+                let way = self.shaft.way_to(self.goal.turns, self.goal.value);
+                match self.position.plain(way, velocity, step) {
+                    Ok(goal) => goal,
+                    Err(_) => return None,
+                }
+            }
+            Duty::Raw => return Some(saturate(self.goal.value, self.range)),
+            // Out of line too: inline, every update of every motor would load a zero for these.
+            Duty::Rest | Duty::First | Duty::Other => return None,
+        };
+        Some(match self.speed.plain(goal, velocity, step) {
+            Ok(output) => free_to_raw(output, self.raw_per_unit),
+            Err(_) => self.follow_velocity(goal, velocity, dt_s),
+        })
+    }
+
+    // Cold, so that the usual path runs straight on. Loops with options also come here, with no other cost.
+    #[cold]
+    #[inline(never)]
+    fn follow_velocity(&mut self, goal: f32, velocity: f32, dt_s: f32) -> i16 {
+        let output = self.speed.step(goal, velocity, &TimeStep::of_motor(dt_s));
+        loop_to_raw(output, self.raw_per_unit, self.range)
+    }
 
     /// Requires full checks of the motor until all is [well](health::waive_check) again.
     const fn require_check(&mut self) {

@@ -1,13 +1,15 @@
-//! Checks of one motor a tick, and its health.
+//! Checks of one motor a tick, and its state and health.
 
 use super::{Slot, coarse};
-use crate::dji::Facts;
 use crate::dji::codec::{FIRST_BELOW_ZERO, Range, celsius, to_raw};
+use crate::dji::{Facts, State};
 use crate::encoder::Homing;
 use crate::motor::{
-    Condition, Conditions, Health, HealthConfig, Link, Monitor, Sample, Traffic, age, elapsed,
+    Condition, Conditions, Health, HealthConfig, Link, Monitor, MotorName, Sample, Traffic, age,
+    elapsed,
 };
 use crate::time::Duration;
+use crate::units::Current;
 
 /// Distance inside of a soft limit from which the motor is no longer at the limit.
 const CLEAR_RAD: f32 = 0.01;
@@ -310,6 +312,36 @@ pub(in crate::dji) fn hear_rival(slot: &mut Slot) {
         begin(slot, Condition::SecondMaster);
         react(slot, before);
     }
+}
+
+/// Returns the state; `None` before the first frame.
+// Inline only: the compiler then drops the fields without a reader.
+#[inline(always)]
+pub(in crate::dji) fn state(slot: &Slot) -> Option<State> {
+    let facts = slot.facts?;
+    if slot.guard.link() == Link::Unheard {
+        return None;
+    }
+    let amperes =
+        slot.direction() * f32::from(slot.feedback.current()) * facts.current_full_scale_a
+            / f32::from(facts.current_raw);
+    Some(State {
+        motor: MotorName::new(facts.name, slot.id(facts)),
+        position: slot.shaft.position(),
+        homing: slot.homing,
+        velocity: slot.velocity(),
+        current: Current::from_amperes(amperes),
+        torque_nm: amperes * slot.nm_per_a,
+        temperature_c: facts.has_temperature.then_some(celsius(slot.feedback.temperature())),
+        error: facts.errors.read(slot.feedback.error()),
+        rotor_counts: slot.shaft.rotor_counts(),
+        ambiguous_gaps: slot.ambiguous_gaps,
+        refused_targets: slot.guard.refused_targets(),
+        forgotten_targets: slot.guard.forgotten_targets(),
+        conditions: slot.guard.latch().active(),
+        link: slot.guard.link(),
+        feedback: slot.feedback,
+    })
 }
 
 /// Returns the health of the motor.

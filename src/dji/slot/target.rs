@@ -1,8 +1,8 @@
-//! Targets, and the loops from a target to the raw command.
+//! Targets of a new kind, and loops outside the usual path.
 
-use super::{Action, Duty, Goal, Key, Slot};
+use super::{Action, Duty, Goal, Slot};
 use crate::control::Pid;
-use crate::dji::codec::{Range, free_to_raw, loop_to_raw, saturate, to_raw};
+use crate::dji::codec::{Range, saturate, to_raw};
 use crate::dji::outbox::Outbox;
 use crate::encoder::Position;
 use crate::motor::{Link, MotorGuard, Rest, TargetError, Timeouts};
@@ -14,41 +14,6 @@ impl Slot {
     pub(in crate::dji) fn relax(&mut self) {
         self.guard.relax();
         self.apply_rules();
-    }
-
-    /// Replaces a target in rad/s of the output shaft by another: a motor with such a target is armed and has a loop.
-    #[inline]
-    pub(in crate::dji) fn renew_velocity(&mut self, motor: Key, rad_per_s: f32, now: u32) -> bool {
-        let goes_on = self.asked == Action::Velocity
-            && self.guard.link() == Link::Online
-            && self.generation == motor.generation()
-            && rad_per_s.is_finite();
-        if goes_on {
-            self.goal.value = rad_per_s.to_bits().cast_signed();
-            self.guard.renew_target(now);
-        }
-        goes_on
-    }
-
-    /// Replaces a target in turns and angle of the output shaft by another, without soft limits.
-    #[inline]
-    pub(in crate::dji) fn renew_position(
-        &mut self,
-        motor: Key,
-        position: Position,
-        now: u32,
-    ) -> bool {
-        let goes_on = self.asked == Action::Position
-            && self.guard.link() == Link::Online
-            && self.generation == motor.generation()
-            && position.is_finite()
-            && self.health.soft_limits.is_none();
-        if goes_on {
-            let (turns, phase) = self.shaft.locate(position);
-            self.goal = Goal { turns: self.shaft.near(turns), value: phase };
-            self.guard.renew_target(now);
-        }
-        goes_on
     }
 
     /// Takes rad/s of the output shaft.
@@ -212,46 +177,12 @@ impl Slot {
         };
     }
 
-    // Update.
-
-    /// Runs the loops of this motor and returns its raw command. `step` is the step of `dt_s`: only the usual path uses `step`, so the step
-    /// stays in registers.
-    #[inline(always)]
-    pub(in crate::dji) fn update(&mut self, step: &TimeStep, dt_s: f32, sent: &Outbox) -> i16 {
-        let velocity = self.velocity().as_rad_per_s();
-        let goal = match self.duty {
-            Duty::Velocity => self.goal.rad_per_s(),
-            Duty::Position => {
-                let way = self.shaft.way_to(self.goal.turns(), self.goal.phase());
-                match self.position.plain(way, velocity, step) {
-                    Ok(goal) => goal,
-                    Err(_) => return self.update_carefully(dt_s, sent),
-                }
-            }
-            Duty::Raw => return saturate(self.goal.raw(), self.range),
-            // Out of line too: inline, every update of every motor would load a zero for these.
-            Duty::Rest | Duty::First | Duty::Other => return self.update_carefully(dt_s, sent),
-        };
-        match self.speed.plain(goal, velocity, step) {
-            Ok(output) => free_to_raw(output, self.raw_per_unit),
-            Err(_) => self.follow_velocity(goal, velocity, dt_s),
-        }
-    }
-
-    // Cold, so that the usual path runs straight on. Loops with options also come here, with no other cost.
-    #[cold]
-    #[inline(never)]
-    fn follow_velocity(&mut self, goal: f32, velocity: f32, dt_s: f32) -> i16 {
-        let output = self.speed.step(goal, velocity, &TimeStep::of_motor(dt_s));
-        loop_to_raw(output, self.raw_per_unit, self.range)
-    }
-
     // Cold, so that the usual path of an update runs straight on.
 
     /// Runs loops of any kind at any limit of the output; or rests, or begins after a rest.
     #[cold]
     #[inline(never)]
-    pub(super) fn update_carefully(&mut self, dt_s: f32, sent: &Outbox) -> i16 {
+    pub(in crate::dji) fn update_carefully(&mut self, dt_s: f32, sent: &Outbox) -> i16 {
         match self.duty {
             Duty::Rest => return 0,
             Duty::First => self.end_rest(),
@@ -265,13 +196,13 @@ impl Slot {
             Action::Velocity => {
                 return self.follow_velocity(self.goal.rad_per_s(), velocity, dt_s);
             }
-            Action::Position => self.shaft.way_to(self.goal.turns(), self.goal.phase()),
-            Action::Angle => self.shaft.shortest_way_to(self.goal.phase()),
+            Action::Position => self.shaft.way_to(self.goal.turns, self.goal.value),
+            Action::Angle => self.shaft.shortest_way_to(self.goal.value),
             Action::Measured => {
                 velocity = self.goal.rate();
                 self.goal.way()
             }
-            Action::Raw => return saturate(self.goal.raw(), self.range),
+            Action::Raw => return saturate(self.goal.value, self.range),
             Action::Rest => return 0,
         };
         let step = TimeStep::of_motor(dt_s);
