@@ -1,6 +1,8 @@
 //! Reasons against arming: missing motors, settings that differ, and all others; and the order in which a request is refused.
 
-use super::{BusLoad, Claim, Guard, MotorName};
+#[cfg(feature = "hal")]
+use super::Guard;
+use super::{BusLoad, Claim, MotorName};
 
 /// The motors that prevent arming, by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -180,10 +182,11 @@ impl Obstacles {
     }
 
     /// As [`check`](Self::check) for one motor outside of the devices: takes the request. `missing` is the motor, if its feedback is
-    /// [missing](Guard::is_missing).
+    /// [missing](super::Guard::is_missing).
     ///
     /// # Errors
     /// That reason.
+    #[cfg(feature = "hal")]
     pub(crate) fn check_one(guard: &mut Guard, missing: Option<MotorName>) -> Result<(), ArmError> {
         let (granted, is_stopped) = (guard.ask(), guard.is_stopped());
         let missing = Missing::of(missing.into_iter());

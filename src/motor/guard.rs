@@ -184,6 +184,7 @@ impl Guard {
     }
 
     /// Tells whether the time of the last update moved on. If not, the length of nothing that lasts until now is known.
+    #[cfg(feature = "hal")]
     pub(crate) const fn knows_time(&self) -> bool {
         !self.motor.latch().has(Condition::ClockFault)
     }
