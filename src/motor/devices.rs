@@ -157,7 +157,7 @@ pub trait Devices {
     /// Names the reason: motors without feedback, a CAN id with two owners or two senders, a fault, a drive with other settings,
     /// a set emergency stop, a request not released since a trip.
     fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
-        let (granted, is_stopped) = (Ask::of(self), self.is_stopped());
+        let (granted, is_stopped) = (ask(self), self.is_stopped());
         Obstacles::check(is_stopped, granted, || {
             let has_motors = self.claims().next().is_some();
             let found = Obstacles { has_motors, clash: self.clash(), ..Obstacles::NONE };
@@ -203,6 +203,14 @@ pub trait Devices {
         self.visit(&mut standing);
         standing.stopped
     }
+}
+
+/// Hands a request to arm to every device; returns whether the request counts for all of them. A caller with a refusal of its own passes
+/// the request on too.
+pub(crate) fn ask(devices: &mut (impl Devices + ?Sized)) -> bool {
+    let mut ask = Ask { granted: true };
+    devices.visit(&mut ask);
+    ask.granted
 }
 
 impl<D: Devices> Devices for &mut D {

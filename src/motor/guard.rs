@@ -1,6 +1,7 @@
 //! Rules of a motor that is a device by itself.
 
-use super::safety::{DeviceGuard, MotorGuard, OPENING, age};
+use super::age;
+use super::safety::{DeviceGuard, MotorGuard, OPENING};
 use crate::motor::{Condition, Conditions, Health, Latch, Link, MotorName, TargetError, Timeouts};
 use crate::time::{Duration, Edge, Instant};
 

@@ -5,10 +5,10 @@ use super::rc::duty;
 use crate::control::Pid;
 use crate::error::ConfigError;
 use crate::motor::{
-    ArmError, Capabilities, Capability, Guard, Link, Obstacles, Repeat, TargetError, VelocityDrive,
-    Watch,
+    ArmError, Capabilities, Capability, Condition, Conditions, Guard, Health, Link, MotorName,
+    Obstacles, Repeat, TargetError, VelocityDrive, Vitals, Watch,
 };
-use crate::time::{Instant, Tick, TimeStep};
+use crate::time::{Edge, Instant, Tick, TimeStep};
 use crate::units::AngularVelocity;
 use core::f32::consts::TAU;
 use embedded_hal::pwm::SetDutyCycle;
@@ -50,6 +50,12 @@ impl<P: core::fmt::Debug, D: core::fmt::Debug> core::fmt::Display for BrushedErr
 }
 
 impl<P: core::fmt::Debug, D: core::fmt::Debug> core::error::Error for BrushedError<P, D> {}
+
+/// Speed of a turning shaft when the no-load speed is not known, as a share of it: no stall, and never a runaway.
+const TURNS: f32 = 0.1;
+
+/// A shaft turns if it moves a count in this time.
+const COUNT_S: f32 = 0.05;
 
 /// A brushed DC motor: a PWM channel and direction pins of its bridge, and the counts of its encoder.
 ///
@@ -322,6 +328,46 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     #[must_use]
     pub const fn guard(&self) -> &Guard {
         &self.guard
+    }
+}
+
+/// Health: conditions of the motor, and every change of a condition.
+impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
+    /// Returns the present conditions of the motor.
+    #[must_use]
+    pub const fn conditions(&self) -> Conditions {
+        self.guard.conditions()
+    }
+
+    /// Returns the health of the motor; without an encoder there is neither rate nor gap.
+    #[must_use]
+    pub fn health(&self) -> Health {
+        self.watch.health(self.config.name, &self.guard, &self.vitals())
+    }
+
+    /// Returns the oldest unread edge. No edge is lost, however late the reading; while an edge waits, the same change
+    /// is not noted again.
+    pub fn next_edge(&mut self) -> Option<Edge<Condition, MotorName>> {
+        self.guard.next_edge(self.config.name)
+    }
+
+    /// Monitors the motor, and relaxes it if configured; returns the remaining share of its limit.
+    fn check(&mut self, now: Instant) -> f32 {
+        let vitals = self.vitals();
+        self.watch.check(&mut self.guard, || vitals, now)
+    }
+
+    /// A motor without an encoder is not known to turn or to stand.
+    fn vitals(&self) -> Vitals {
+        let Some(counts_per_turn) = self.config.counts_per_turn else { return Vitals::default() };
+        let speed = match self.config.no_load {
+            Some(no_load) => self.rad_per_s / no_load.as_rad_per_s(),
+            None if self.rad_per_s.abs() > TAU / (counts_per_turn * COUNT_S) => {
+                TURNS.copysign(self.rad_per_s)
+            }
+            None => 0.0,
+        };
+        Vitals { effort: self.output / self.config.limit, speed, ..Vitals::default() }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Supervision of a runner: its settings, arming, the counters and conditions, the emergency stop, and the abort of pending frames.
 
 use super::{BusCondition, Port, Runner, Statistics};
-use crate::motor::{ArmError, Ask, BusLoad, Devices};
+use crate::motor::{ArmError, BusLoad, Devices, ask};
 use crate::time::{Clock, Duration, Edge, Tick, Ticker};
 use core::sync::atomic::{AtomicBool, Ordering};
 use embedded_can::ErrorKind;
@@ -77,7 +77,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
             });
         };
         // A refused request is a request.
-        Ask::of(&mut self.device);
+        ask(&mut self.device);
         Err(refusal)
     }
 

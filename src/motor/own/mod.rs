@@ -11,11 +11,11 @@ mod route;
 mod settings;
 
 pub use impedance::ImpedanceControl;
-pub(crate) use impedance::TorqueLoops;
+pub(crate) use impedance::{Shaft, TorqueLoops};
 pub use motor::{Impedance, Order, OwnMotor, Target};
 pub use settings::{Inquiry, Settings};
 
-pub(crate) use mode::{ControlMode, Goal, Questions, Shaft, Told, inside};
+pub(crate) use mode::{ControlMode, Goal, Questions, Told, inside};
 pub(crate) use motor::ingest_eight;
 pub(crate) use registers::{
     Form, code_from, lowest_bit, mit_model, models, register_questions, registers,

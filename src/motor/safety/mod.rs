@@ -40,7 +40,7 @@
 mod device;
 mod motor;
 
-use crate::time::{Duration, Instant};
+use crate::time::Duration;
 
 pub(crate) use device::{Ages, DeviceGuard, Hold, LONGEST_PAUSE};
 pub(crate) use motor::MotorGuard;
@@ -109,28 +109,6 @@ impl Repeat {
 
 /// Longest pause between two checks for which a 32-bit stamp still represents an age.
 const LONGEST_PAUSE_US: u32 = 60_000_000;
-
-/// Tells whether a stamp, of 32 bits in µs, lies within `limit` of `now`, before or after. A stamp repeats after 71 min 35 s.
-///
-/// A stamp may lie after `now`, because an interrupt may stamp a frame just after a tick has read the clock. The limit holds there too:
-/// after a set-back of the clock, an old stamp must not look fresh.
-#[inline]
-pub(crate) const fn is_near(now: u32, stamp: u32, limit: u32) -> bool {
-    now.wrapping_sub(stamp).wrapping_add(limit) <= limit.wrapping_mul(2)
-}
-
-/// Returns the age of a stamp; zero for a stamp ahead.
-pub(crate) const fn age(now: u32, stamp: u32) -> u32 {
-    let age = now.wrapping_sub(stamp);
-    if age.cast_signed() < 0 { 0 } else { age }
-}
-
-/// Returns the age of a stamp, which is brought to `now` if the clock went back behind it.
-pub(crate) fn take_age(now: Instant, stamp: &mut u32) -> Duration {
-    let micros = age(now.stamp(), *stamp);
-    *stamp = now.stamp().wrapping_sub(micros);
-    Duration::from_micros(micros.into())
-}
 
 /// Returns whole milliseconds, at most 65 s.
 const fn whole_ms(time: Duration) -> u16 {
