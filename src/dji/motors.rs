@@ -5,7 +5,7 @@ use super::slot::health::Rounds;
 use super::slot::{Key, Slot};
 use super::{CommandFrame, Model};
 use crate::frame::CanFrame;
-use crate::motor::{DeviceGuard, LONGEST_PAUSE, TargetError};
+use crate::motor::{DeviceGuard, TargetError};
 use crate::time::Instant;
 use crate::units::{Angle, AngularVelocity};
 use core::marker::PhantomData;
@@ -222,11 +222,7 @@ impl<const N: usize> Motors<N> {
         at: Instant,
     ) -> Result<(), TargetError> {
         let guard = &self.guard;
-        let (now, updated, timeouts) = (guard.now(), guard.updated(), *guard.timeouts());
-        // A 32-bit stamp alone would be fresh again every 71 minutes.
-        let is_ahead = guard.is_running() && at.since(updated) > LONGEST_PAUSE;
-        let is_far = is_ahead || updated.since(at) > timeouts.measured();
-        let at = (!is_far).then(|| at.stamp());
+        let (now, timeouts, at) = (guard.now(), *guard.timeouts(), guard.stamp_of(at));
         self.change_present(motor, |slot| {
             slot.set_measured(way.as_radians(), velocity.as_rad_per_s(), at, now, &timeouts)
         })?;

@@ -35,7 +35,7 @@ impl Missing {
     pub(super) const NONE: Self = Self { names: [None; Self::CAPACITY], total: 0, full_bus: None };
 
     /// Keeps the load of the bus if the bus may be full.
-    pub(crate) fn on_bus(self, load: Option<BusLoad>) -> Self {
+    fn on_bus(self, load: Option<BusLoad>) -> Self {
         Self { full_bus: load.and_then(BusLoad::of_full_bus), ..self }
     }
 
@@ -138,6 +138,14 @@ impl ArmError {
             Some(Self::BusDown)
         } else {
             None
+        }
+    }
+
+    /// Keeps the load of the bus for motors that are missing, if the bus may be full.
+    pub(crate) fn on_bus(self, load: Option<BusLoad>) -> Self {
+        match self {
+            Self::Missing(missing) => Self::Missing(missing.on_bus(load)),
+            other => other,
         }
     }
 }

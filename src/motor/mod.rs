@@ -65,6 +65,6 @@ pub(crate) use own::{
 };
 pub use own::{Impedance, ImpedanceControl, Inquiry, Order, Own, OwnMotor, Settings, Target};
 pub use safety::OPENING;
-pub(crate) use safety::{Ages, DeviceGuard, Hold, LONGEST_PAUSE, MotorGuard, Repeat, Rest};
+pub(crate) use safety::{Ages, DeviceGuard, Hold, MotorGuard, Repeat, Rest};
 pub use watch::Vitals;
 pub(crate) use watch::Watch;

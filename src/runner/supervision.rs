@@ -71,10 +71,8 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     pub fn arm(&mut self, tick: Tick) -> Result<(), ArmError> {
         let is_stopped = self.stop.is_some_and(EmergencyStop::is_set);
         let Some(refusal) = ArmError::around(is_stopped, self.is_bus_down()) else {
-            return self.device.arm(tick.now()).map_err(|refusal| match refusal {
-                ArmError::Missing(missing) => ArmError::Missing(missing.on_bus(self.meter.last())),
-                other => other,
-            });
+            let outcome = self.device.arm(tick.now());
+            return outcome.map_err(|refusal| refusal.on_bus(self.meter.last()));
         };
         // A refused request is a request.
         ask(&mut self.device);

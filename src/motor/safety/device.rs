@@ -5,7 +5,7 @@ use super::{LONGEST_PAUSE_US, Repeat};
 use crate::motor::{Journal, Link, Timeouts};
 use crate::time::{Duration, Instant};
 
-pub(crate) const LONGEST_PAUSE: Duration = Duration::from_micros(LONGEST_PAUSE_US as u64);
+const LONGEST_PAUSE: Duration = Duration::from_micros(LONGEST_PAUSE_US as u64);
 
 /// Decides whether an update may drive the motors of a device, and which motors may be armed. Keeps `N` times of edges.
 #[derive(Debug, Clone, Copy)]
@@ -69,6 +69,14 @@ impl<const N: usize> DeviceGuard<N> {
 
     pub(crate) const fn timeouts(&self) -> &Timeouts {
         &self.timeouts
+    }
+
+    /// Returns the stamp of a measurement of another sensor; `None` for a measurement too old, or too far ahead.
+    pub(crate) fn stamp_of(&self, at: Instant) -> Option<u32> {
+        // A 32-bit stamp alone would be fresh again every 71 minutes.
+        let is_ahead = self.is_running && at.since(self.updated) > LONGEST_PAUSE;
+        let is_far = is_ahead || self.updated.since(at) > self.timeouts.measured();
+        (!is_far).then(|| at.stamp())
     }
 
     /// Returns the stamp of new targets.

@@ -42,7 +42,7 @@ mod motor;
 
 use crate::time::Duration;
 
-pub(crate) use device::{Ages, DeviceGuard, Hold, LONGEST_PAUSE};
+pub(crate) use device::{Ages, DeviceGuard, Hold};
 pub(crate) use motor::MotorGuard;
 
 /// Default time in which the output range of a motor opens after arming: 0.2 s.
