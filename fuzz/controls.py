@@ -126,7 +126,7 @@ DEFECTS = [
     ("snake", "a write given back goes before others", "src/snake/slot.rs",
      "self.ahead |= self.renew", "self.ahead = self.renew"),
     ("snake", "without a step, late, it moves on", "src/motor/safety/device.rs",
-     "repeat.is_allowed() && !is_late", "repeat.is_allowed() && (!is_late || true)"),
+     "repeat.admits(true) && !is_late", "repeat.admits(true) && (!is_late || true)"),
     ("snake", "without a step no disable is sent again", "src/snake/bus.rs",
      "self.remind();\n        schedule::stop_again(self);\n", "self.remind();\n"),
     ("snake", "without a step an answer is waited for for ever", "src/snake/bus.rs",

@@ -6,7 +6,7 @@ use super::outbox::{Outbox, Place};
 use super::slot::config::configured;
 use super::slot::{Key, Slot, health};
 use super::{AttachError, Facts};
-use crate::motor::{ArmError, BusLoad, Claim, Condition, Missing, MotorName, Obstacles, Role};
+use crate::motor::{ArmError, BusLoad, Claim, Condition, MotorName, Obstacles, Role};
 use crate::time::Instant;
 use core::ops::Range;
 use embedded_can::StandardId;
@@ -113,17 +113,14 @@ pub(super) fn arm_only<const N: usize>(
     now: Instant,
 ) -> Result<(), ArmError> {
     let (granted, is_stopped) = (motors.guard.ask(), motors.guard.is_stopped());
-    Obstacles::check(is_stopped, granted, || {
+    Obstacles::check(is_stopped, granted, |found| {
         let slots = || chosen.clone().filter_map(|motor| motors.get(motor));
         let missing = slots().filter(|slot| motors.guard.misses(&slot.guard, now));
         let faulty = slots().filter(|slot| health::is_faulty(slot));
-        Obstacles {
-            has_motors: slots().next().is_some(),
-            missing: Missing::of(missing.filter_map(Slot::name)),
-            second_master: rival_among(slots()),
-            faulty: Missing::of(faulty.filter_map(Slot::name)),
-            ..Obstacles::NONE
-        }
+        found.has_motors = slots().next().is_some();
+        found.missing.extend(missing.filter_map(Slot::name));
+        found.second_master = rival_among(slots());
+        found.faulty.extend(faulty.filter_map(Slot::name));
     })?;
     if !motors.guard.begin_arming(now) {
         return Ok(());

@@ -19,27 +19,23 @@ impl Missing {
 
     /// Collects names; `None` without any.
     pub fn collect(names: impl Iterator<Item = MotorName>) -> Option<Self> {
-        Self::of(names).some()
-    }
-
-    pub(crate) fn of(names: impl Iterator<Item = MotorName>) -> Self {
         let mut missing = Self::NONE;
-        names.for_each(|name| missing.add(name));
-        missing
+        missing.extend(names);
+        (missing.total > 0).then_some(missing)
     }
 
-    fn some(self) -> Option<Self> {
-        (self.total > 0).then_some(self)
+    pub(crate) fn extend(&mut self, names: impl Iterator<Item = MotorName>) {
+        names.for_each(|name| self.add(name));
     }
 
-    pub(super) const NONE: Self = Self { names: [None; Self::CAPACITY], total: 0, full_bus: None };
+    const NONE: Self = Self { names: [None; Self::CAPACITY], total: 0, full_bus: None };
 
     /// Keeps the load of the bus if the bus may be full.
     fn on_bus(self, load: Option<BusLoad>) -> Self {
         Self { full_bus: load.and_then(BusLoad::of_full_bus), ..self }
     }
 
-    pub(super) fn add(&mut self, name: MotorName) {
+    fn add(&mut self, name: MotorName) {
         if let Some(place) = self.names.get_mut(usize::from(self.total)) {
             *place = Some(name);
         }
@@ -172,49 +168,62 @@ impl Obstacles {
         wrong_setting: None,
     };
 
-    /// Returns the first of the reasons against a request to arm, in the order of all devices: the emergency stop, no motor, a clash of
+    /// Checks a request to arm. The reasons against arming come in this order, for all devices: the emergency stop, no motor, a clash of
     /// ids, another setting, missing feedback, a second master, a fault, a setting not known yet, and a request that is
-    /// [not granted](crate::motor::safety::DeviceGuard::ask). If the stop is set, `obstacles` is not called.
+    /// [not granted](crate::motor::safety::DeviceGuard::ask). If the stop is set, `survey` is not called.
     ///
     /// # Errors
-    /// That reason.
+    /// The first reason.
     pub(crate) fn check(
         is_stopped: bool,
         granted: bool,
-        obstacles: impl FnOnce() -> Self,
+        survey: impl FnOnce(&mut Self),
     ) -> Result<(), ArmError> {
-        match ArmError::around(is_stopped, false) {
-            Some(refusal) => Err(refusal),
-            None => obstacles().refusal(granted).map_or(Ok(()), Err),
+        if is_stopped {
+            return Err(ArmError::Stopped);
         }
+        let mut found = Self::NONE;
+        survey(&mut found);
+        found.refusal(granted)
     }
 
     /// As [`check`](Self::check) for one motor outside of the devices: takes the request. `missing` is the motor, if its feedback is
     /// [missing](super::Guard::is_missing).
     ///
     /// # Errors
-    /// That reason.
+    /// The first reason.
     #[cfg(feature = "hal")]
     pub(crate) fn check_one(guard: &mut Guard, missing: Option<MotorName>) -> Result<(), ArmError> {
         let (granted, is_stopped) = (guard.ask(), guard.is_stopped());
-        let missing = Missing::of(missing.into_iter());
-        Self::check(is_stopped, granted, || Self { missing, ..Self::NONE })
+        Self::check(is_stopped, granted, |found| found.missing.extend(missing.into_iter()))
     }
 
-    fn refusal(self, granted: bool) -> Option<ArmError> {
+    // In order, and by reference: a refusal has the size of twelve names.
+    #[inline(never)]
+    fn refusal(&self, granted: bool) -> Result<(), ArmError> {
         if !self.has_motors {
-            return Some(ArmError::NoMotors);
+            return Err(ArmError::NoMotors);
         }
-        let clash = self.clash.map(|(one, other)| ArmError::Clash(one, other));
+        if let Some((one, other)) = self.clash {
+            return Err(ArmError::Clash(one, other));
+        }
         // A drive set up for other commands may answer none of ours.
-        let differs = self.wrong_setting.filter(|wrong| wrong.found.is_some());
-        clash
-            .or_else(|| differs.map(ArmError::Setting))
-            .or_else(|| self.missing.some().map(ArmError::Missing))
-            .or_else(|| self.second_master.map(ArmError::SecondMaster))
-            .or_else(|| self.faulty.some().map(ArmError::Faulty))
-            .or_else(|| self.wrong_setting.map(ArmError::Setting))
-            .or_else(|| (!granted).then_some(ArmError::NotReleased))
+        if let Some(wrong) = self.wrong_setting.filter(|wrong| wrong.found.is_some()) {
+            return Err(ArmError::Setting(wrong));
+        }
+        if self.missing.total > 0 {
+            return Err(ArmError::Missing(self.missing));
+        }
+        if let Some(claim) = self.second_master {
+            return Err(ArmError::SecondMaster(claim));
+        }
+        if self.faulty.total > 0 {
+            return Err(ArmError::Faulty(self.faulty));
+        }
+        if let Some(wrong) = self.wrong_setting {
+            return Err(ArmError::Setting(wrong));
+        }
+        if granted { Ok(()) } else { Err(ArmError::NotReleased) }
     }
 }
 

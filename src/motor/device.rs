@@ -278,17 +278,17 @@ impl Visitor for Rival {
 }
 
 /// Collects what stands against arming.
-pub(super) struct Survey {
+pub(super) struct Survey<'a> {
     pub(super) now: Instant,
-    pub(super) found: Obstacles,
+    pub(super) found: &'a mut Obstacles,
 }
 
-impl Visitor for Survey {
+impl Visitor for Survey<'_> {
     #[inline]
     fn visit(&mut self, device: &mut impl CanDevice) {
-        let found = &mut self.found;
-        device.missing(self.now).for_each(|motor| found.missing.add(motor));
-        device.faulty().for_each(|motor| found.faulty.add(motor));
+        let found = &mut *self.found;
+        found.missing.extend(device.missing(self.now));
+        found.faulty.extend(device.faulty());
         found.wrong_setting = found.wrong_setting.or_else(|| device.wrong_setting());
         found.second_master = found.second_master.or_else(|| device.second_master());
     }

@@ -158,12 +158,10 @@ pub trait Devices {
     /// a set emergency stop, a request not released since a trip.
     fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
         let (granted, is_stopped) = (ask(self), self.is_stopped());
-        Obstacles::check(is_stopped, granted, || {
-            let has_motors = self.claims().next().is_some();
-            let found = Obstacles { has_motors, clash: self.clash(), ..Obstacles::NONE };
-            let mut survey = Survey { now, found };
-            self.visit(&mut survey);
-            survey.found
+        Obstacles::check(is_stopped, granted, |found| {
+            found.has_motors = self.claims().next().is_some();
+            found.clash = self.clash();
+            self.visit(&mut Survey { now, found });
         })?;
         self.visit(&mut Engage(now));
         Ok(())

@@ -166,7 +166,7 @@ impl<M: OwnMotor> Own<M> {
     /// Enables, disables, asks, commands and rests, as the motor may be driven or not.
     #[inline(never)]
     fn update_anyhow(&mut self, drives: bool, step: TimeStep, left: f32, now: Instant) {
-        let may_drive = self.offered.may_repeat.drives(drives, step.is_hold());
+        let may_drive = drives && self.offered.may_repeat.admits(step.is_hold());
         // A question that is given back from now on did not enable the drive, and rest that nobody took was not sent.
         self.switched.take_if(|_| self.power.is_confirmed() && self.switching.is_none());
         self.offered.is_rest &= !self.offered.waits;

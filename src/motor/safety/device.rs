@@ -177,7 +177,7 @@ impl<const N: usize> DeviceGuard<N> {
             return Hold::LoseTime;
         }
         let is_late = self.updated.since(before) > self.timeouts.late();
-        if repeat.is_allowed() && !is_late { Hold::Keep } else { Hold::Rest }
+        if repeat.admits(true) && !is_late { Hold::Keep } else { Hold::Rest }
     }
 
     /// Returns the number of updates in a row without a usable time or step.

@@ -90,13 +90,15 @@ impl Repeat {
         Self(drove && !is_hold)
     }
 
-    pub(crate) const fn is_allowed(self) -> bool {
-        self.0
+    /// Tells whether an update may give a command: with a usable step, or once without.
+    pub(crate) const fn admits(self, is_hold: bool) -> bool {
+        !is_hold || self.0
     }
 
     /// Tells whether an update may drive the motor, and notes the update.
+    #[cfg(feature = "hal")]
     pub(crate) const fn drives(&mut self, may_drive: bool, is_hold: bool) -> bool {
-        let drives = may_drive && (!is_hold || self.is_allowed());
+        let drives = may_drive && self.admits(is_hold);
         *self = Self::after_update(drives, is_hold);
         drives
     }
