@@ -2,6 +2,7 @@
 
 #![cfg(test)]
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -396,8 +397,9 @@ fn a_family_has_at_most_so_many_lines_and_types() {
     assert_eq!(shown("mod a;\npub use a::A;\npub use b::{B, C,\n    d};\n"), 3);
 }
 
-/// A family asks the safety core, and has no rule of its own about these.
-const RULES: [&str; 9] = [
+/// A family asks the safety core, and has no rule of its own about these: ages and their limits, the gesture, the order of refusals, time
+/// that did not move on.
+const RULES: [&str; 14] = [
     "late_us",
     "offline_us",
     "command_us",
@@ -406,7 +408,22 @@ const RULES: [&str; 9] = [
     "is_near",
     "Gesture",
     "Condition::Late",
-    "Condition::ClockFault, true",
+    "ClockFault",
+    "ArmError::",
+    ".late()",
+    ".offline()",
+    ".command()",
+    ".measured()",
+];
+
+/// Durations that a family compares with a limit: of the frames of its drives, none of a link or a target. File, words, reason.
+const TIMES_OF_DRIVES: [(&str, &str, &str); 6] = [
+    ("pwm/rc.rs", "config . arming", "an ESC wants neutral for so long before it follows"),
+    ("snake/slot.rs", "KEEP_RELAXED", "a disable is sent again: a drive may have missed it"),
+    ("snake/slot/health.rs", "window", "a joint that does not move, as its configuration says"),
+    ("motor/own/power.rs", "SETTLING", "a drive may report its former state for so long"),
+    ("motor/own/power.rs", "pause", "a frame for the power of a drive is sent again"),
+    ("motor/own/device.rs", "INQUIRY", "the rate of questions for settings"),
 ];
 
 fn own_rules(text: &str) -> Vec<String> {
@@ -415,23 +432,120 @@ fn own_rules(text: &str) -> Vec<String> {
     lines.map(|(number, line)| format!("{number}: {line}")).collect()
 }
 
+/// Statements that compare a time since another with a limit, and those that count held updates.
+fn own_judgements(text: &str) -> Vec<String> {
+    let tokens = tokens(text);
+    let statements = tokens.split(|token| [";", "{", "}"].contains(&token.as_str()));
+    let judges = |statement: &&[String]| {
+        let is = |place: usize, word: &str| statement.get(place).is_some_and(|token| token == word);
+        let places = || 0..statement.len();
+        let has_since =
+            places().any(|place| is(place, ".") && is(place + 1, "since") && is(place + 2, "("));
+        // No arrow, and no bracket of a type.
+        let compares = places().any(|place| {
+            (is(place, "<") || is(place, ">"))
+                && !is(place.wrapping_sub(1), "-")
+                && !is(place.wrapping_sub(1), "=")
+                && !is(place + 1, ">")
+        });
+        let is_held =
+            |token: &String| token.split('_').any(|word| word == "held" || word == "hold");
+        let counts = places()
+            .any(|place| is(place, "saturating_add") || is(place, "+") && is(place + 1, "="));
+        has_since && compares || counts && statement.iter().any(is_held)
+    };
+    statements.filter(judges).map(|statement| statement.join(" ")).collect()
+}
+
+/// The files of the families, and of own motors: the path below `src`, and the text.
+fn files_of_families() -> impl Iterator<Item = (String, String)> {
+    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let folders = FAMILIES.into_iter().chain(["pwm", "motor/own"]);
+    let files = folders.flat_map(move |folder| {
+        let files = rust_files(&src.join(folder)).into_iter();
+        let src = src.clone();
+        files.map(move |file| (file.strip_prefix(&src).unwrap().display().to_string(), file))
+    });
+    let files = files.filter(|(name, _)| !name.contains("/tests"));
+    files.map(|(name, file)| (name, fs::read_to_string(file).unwrap()))
+}
+
 #[test]
 fn no_family_has_a_safety_rule_of_its_own() {
-    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    for family in
-        ["damiao", "dji", "lk", "odrive", "rmd", "robstride", "snake", "vesc", "pwm", "motor/own"]
-    {
-        let files = rust_files(&src.join(family));
-        for file in
-            files.iter().filter(|file| !file.components().any(|part| part.as_os_str() == "tests"))
-        {
-            let found = own_rules(&fs::read_to_string(file).unwrap());
-            assert!(found.is_empty(), "{}: {found:?}", file.display());
-        }
+    for (file, text) in files_of_families() {
+        let found = own_rules(&text);
+        assert!(found.is_empty(), "{file}: {found:?}");
     }
+    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let core = rust_files(&src.join("motor/safety"));
     let of_core = core.iter().map(|file| own_rules(&fs::read_to_string(file).unwrap()).len());
     assert!(of_core.sum::<usize>() > 10, "the rules are somewhere");
+}
+
+#[test]
+fn no_family_compares_an_age_with_a_limit_or_counts_held_updates() {
+    let mut used = BTreeSet::new();
+    for (file, text) in files_of_families() {
+        for statement in own_judgements(&text) {
+            let of_drive =
+                |(name, words, _): &(&str, &str, &str)| *name == file && statement.contains(words);
+            let place = TIMES_OF_DRIVES.iter().position(of_drive);
+            assert!(place.is_some(), "{file} judges by itself: {statement}");
+            used.extend(place);
+        }
+        // An update without a step is judged by the one rule about it.
+        let asks = ["Repeat", ".guard.hold("].iter().any(|rule| text.contains(rule));
+        assert!(asks || !text.contains("is_hold()"), "{file} has its own rule for a held update");
+    }
+    assert_eq!(used.len(), TIMES_OF_DRIVES.len(), "an exception without its line");
+}
+
+/// The order of the reasons has one home: nothing but it makes a refusal.
+#[test]
+fn a_request_to_arm_is_refused_in_one_file() {
+    let homes: Vec<String> = sources()
+        .into_iter()
+        .filter(|(module, path, _)| module != "sim" && !path.iter().any(|part| part == "tests"))
+        .filter(|(_, _, text)| makes_refusal(&tokens(text)))
+        .map(|(_, path, _)| path.display().to_string())
+        .collect();
+    assert!(homes.iter().all(|home| home.ends_with("motor/arming.rs")), "{homes:?}");
+    assert_eq!(homes.len(), 1);
+}
+
+fn makes_refusal(tokens: &[String]) -> bool {
+    tokens.windows(3).any(|path| {
+        path[0] == "ArmError" && path[1] == "::" && path[2].starts_with(char::is_uppercase)
+    })
+}
+
+#[test]
+fn a_rule_in_a_family_is_found() {
+    assert!(makes_refusal(&tokens("return Err(ArmError::NotReleased);")));
+    assert!(!makes_refusal(&tokens("// ArmError::Stopped\nArmError::around(stopped, down)")));
+
+    for rule in [
+        "if stopped { return Err(ArmError::Stopped); }",
+        "if self.guard.conditions().contains(Condition::ClockFault) {}",
+        "let is_old = age > timeouts.late();",
+    ] {
+        assert_eq!(own_rules(rule).len(), 1, "{rule}");
+    }
+    for rule in [
+        "if now.since(self.heard) > LIMIT { self.rest(); }",
+        "let is_fresh = now.since(self.commanded)\n    <= self.limit;",
+        "self.held_steps = self.held_steps.saturating_add(1);",
+        "hold_count += 1;",
+    ] {
+        assert_eq!(own_judgements(rule).len(), 1, "{rule}");
+    }
+    for other in [
+        "/// ArmError::Stopped\nfn arm(&mut self) -> Result<(), ArmError> {}",
+        "let dt: Option<f32> = Some(now.since(then).as_secs_f32());\nlet x = a > b;",
+    ] {
+        assert!(own_rules(other).is_empty(), "{other}");
+    }
+    assert_eq!(own_judgements("let dt = now.since(then); let is_more = threshold > 1;").len(), 0);
 }
 
 /// The types whose inherent methods stand in at most this many files.
@@ -464,7 +578,7 @@ fn inherent(text: &str) -> Vec<String> {
 
 #[test]
 fn the_inherent_methods_of_a_type_stand_in_at_most_two_files() {
-    let mut files = std::collections::BTreeMap::<(String, String), Vec<String>>::new();
+    let mut files = BTreeMap::<(String, String), Vec<String>>::new();
     for (module, path, text) in sources() {
         if path.components().any(|part| part.as_os_str() == "tests") {
             continue;
@@ -488,4 +602,455 @@ fn an_inherent_impl_is_told_from_that_of_a_trait() {
     assert_eq!(inherent("impl<M: Model<Command = Current>> Config<M> {"), ["Config"]);
     assert_eq!(inherent("impl super::Slot {\n}\nimpl Default for Bus {"), ["Slot"]);
     assert!(inherent("impl<D: Devices> Devices for &mut D {\nfn impl_it() {}").is_empty());
+}
+
+/// Words and signs of a text, without comments, strings, lifetimes and tests.
+fn tokens(text: &str) -> Vec<String> {
+    let text: String = code(text).flat_map(|line| [line, "\n"]).collect();
+    let letters: Vec<char> = text.chars().collect();
+    let at = |place: usize| letters.get(place).copied().unwrap_or('\n');
+    let (mut found, mut place) = (Vec::new(), 0);
+    while place < letters.len() {
+        let (begin, is_word) = (place, |c: char| c.is_alphanumeric() || c == '_');
+        match at(place) {
+            '/' if at(place + 1) == '/' => {
+                while at(place) != '\n' {
+                    place += 1;
+                }
+            }
+            '"' => {
+                place += 1;
+                while place < letters.len() && at(place) != '"' {
+                    place += if at(place) == '\\' { 2 } else { 1 };
+                }
+                place += 1;
+            }
+            '\'' if at(place + 1) == '\\' => place += 4,
+            '\'' if at(place + 2) == '\'' => place += 3,
+            '\'' => place += 1,
+            ':' if at(place + 1) == ':' => place += 2,
+            letter if is_word(letter) => {
+                while is_word(at(place)) {
+                    place += 1;
+                }
+            }
+            _ => place += 1,
+        }
+        let token: String = letters[begin..place.min(letters.len())].iter().collect();
+        if !token.starts_with(['/', '"', '\'']) && !token.trim().is_empty() || token == "/" {
+            found.push(token);
+        }
+    }
+    found
+}
+
+/// What stands around a definition.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Around {
+    /// An inherent `impl`, or a trait.
+    Methods,
+    /// The `impl` of a trait: its methods are defined by the trait.
+    OfTrait,
+    Module,
+    Body,
+}
+
+/// The items that a file defines, and the methods of its inherent `impl`s and traits.
+fn definitions(tokens: &[String]) -> (BTreeSet<String>, BTreeSet<String>) {
+    let (mut items, mut methods) = (BTreeSet::new(), BTreeSet::new());
+    let (mut around, mut next) = (Vec::new(), Around::Body);
+    for (place, token) in tokens.iter().enumerate() {
+        let word = |ahead: usize| tokens.get(place + ahead).map_or("", String::as_str);
+        let is_outside = around.iter().all(|around| *around == Around::Module);
+        let is_method = around.last() == Some(&Around::Methods);
+        match token.as_str() {
+            "impl" if is_outside => {
+                let header = tokens[place..].iter().take_while(|token| *token != "{");
+                let is_of_trait = header.into_iter().any(|token| token == "for");
+                next = if is_of_trait { Around::OfTrait } else { Around::Methods };
+            }
+            "trait" | "struct" | "enum" | "type" | "static" if is_outside => {
+                items.insert(word(1).to_owned());
+                next = if token == "trait" { Around::Methods } else { Around::Body };
+            }
+            "const" if is_outside && !["fn", "{", "_"].contains(&word(1)) => {
+                items.insert(word(1).to_owned());
+            }
+            "macro_rules" if is_outside => {
+                items.insert(word(2).to_owned());
+            }
+            "fn" => {
+                if is_outside {
+                    items.insert(word(1).to_owned());
+                } else if is_method {
+                    methods.insert(word(1).to_owned());
+                }
+                next = Around::Body;
+            }
+            "mod" if is_outside => next = Around::Module,
+            "{" => around.push(core::mem::replace(&mut next, Around::Body)),
+            "}" => _ = around.pop(),
+            ";" => next = Around::Body,
+            _ => {}
+        }
+    }
+    (items, methods)
+}
+
+/// The paths that a file names: those of each `use`, one for each leaf, and those in its code. Of a re-export, none.
+fn named_paths(tokens: &[String]) -> Vec<Vec<String>> {
+    let is_word = |token: &str| token.starts_with(|c: char| c.is_alphanumeric() || c == '_');
+    let (mut paths, mut place) = (Vec::new(), 0);
+    while place < tokens.len() {
+        if tokens[place] == "use" {
+            let end = place + tokens[place..].iter().take_while(|token| *token != ";").count();
+            let is_shown = place > 0 && (tokens[place - 1] == "pub" || tokens[place - 1] == ")");
+            if !is_shown {
+                leaves(&tokens[place + 1..end], &[], &mut |path, _| paths.push(path));
+            }
+            place = end;
+        } else if is_word(&tokens[place]) {
+            let (begin, mut path) = (place, vec![tokens[place].clone()]);
+            while tokens.get(place + 1).is_some_and(|token| token == "::")
+                && tokens.get(place + 2).is_some_and(|token| is_word(token))
+            {
+                place += 2;
+                path.push(tokens[place].clone());
+            }
+            // `pub(in crate::dji)` names no item.
+            if path.len() > 1 && !(begin > 0 && tokens[begin - 1] == "in" && path[0] == "crate") {
+                paths.push(path);
+            }
+        }
+        place += 1;
+    }
+    paths
+}
+
+/// Hands on each path of a tree of a `use`, and the name it brings in.
+fn leaves(tree: &[String], before: &[String], take: &mut dyn FnMut(Vec<String>, String)) {
+    let mut depth = 0;
+    let branches = tree.split(|token| {
+        depth += i32::from(token == "{") - i32::from(token == "}");
+        depth == 0 && token == ","
+    });
+    for branch in branches.filter(|branch| !branch.is_empty()) {
+        let open = branch.iter().position(|token| token == "{");
+        let (way, inner) = branch.split_at(open.unwrap_or(branch.len()));
+        let steps = way.iter().take_while(|token| *token != "as");
+        let mut path = before.to_vec();
+        path.extend(steps.filter(|token| *token != "::").cloned());
+        match inner {
+            [_, inner @ .., _] => leaves(inner, &path, take),
+            _ => {
+                path.pop_if(|last| last == "self");
+                let name = way.last().filter(|name| *name != "self").or(path.last()).cloned();
+                take(path, name.unwrap_or_default());
+            }
+        }
+    }
+}
+
+/// The path of a module below the crate: `dji/slot/gap`. Empty for `lib.rs`.
+type Module = Vec<String>;
+
+/// The file of a module.
+#[derive(Debug, Default)]
+struct File {
+    tokens: Vec<String>,
+    items: BTreeSet<String>,
+    methods: BTreeSet<String>,
+    /// The types with inherent methods here.
+    types: BTreeSet<String>,
+    /// The names brought in by a `use`, each with its path in the file.
+    brought: BTreeMap<String, Vec<String>>,
+}
+
+impl File {
+    fn of(text: &str) -> Self {
+        let tokens = tokens(text);
+        let (items, methods) = definitions(&tokens);
+        let mut brought = BTreeMap::new();
+        for (place, _) in tokens.iter().enumerate().filter(|(_, token)| *token == "use") {
+            let end = place + tokens[place..].iter().take_while(|token| *token != ";").count();
+            leaves(&tokens[place + 1..end], &[], &mut |path, name| _ = brought.insert(name, path));
+        }
+        Self { items, methods, types: inherent(text).into_iter().collect(), brought, tokens }
+    }
+}
+
+/// The place of a module below a folder: the first step of the way there, or `.` for the folder itself.
+fn node<'a>(folder: &[String], module: &'a Module) -> Option<&'a str> {
+    Some(module.strip_prefix(folder)?.first().map_or(".", String::as_str))
+}
+
+/// The files of a crate, by module.
+struct House(BTreeMap<Module, File>);
+
+impl House {
+    fn of<'a>(files: impl Iterator<Item = (Module, &'a str)>) -> Self {
+        Self(files.map(|(module, text)| (module, File::of(text))).collect())
+    }
+
+    fn of_crate() -> Self {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+        let is_test = |path: &Path| path.iter().any(|part| part == "tests" || part == "tests.rs");
+        let files = sources().into_iter().filter(|(_, path, _)| !is_test(path));
+        let files: Vec<(Module, String)> = files
+            .map(|(_, path, text)| {
+                let way = path.strip_prefix(&root).unwrap().with_extension("");
+                let way = way.iter().map(|part| part.to_string_lossy().into_owned());
+                (way.filter(|part| part != "mod" && part != "lib").collect(), text)
+            })
+            .collect();
+        Self::of(files.iter().map(|(module, text)| (module.clone(), text.as_str())))
+    }
+
+    /// The path from the root of the crate of a path in a file; `None` for a path of another crate.
+    fn absolute(&self, module: &[String], path: &[String]) -> Option<Module> {
+        let [first, rest @ ..] = path else { return None };
+        let mut here = module.to_vec();
+        match first.as_str() {
+            "crate" => return Some(rest.to_vec()),
+            "self" => {}
+            "super" => {
+                let ups = path.iter().take_while(|step| *step == "super").count();
+                here.truncate(module.len().checked_sub(ups)?);
+                return Some([&here, &path[ups..]].concat());
+            }
+            _ => {
+                let child = [module, &path[..1]].concat();
+                if self.0.contains_key(&child) {
+                    return Some([module, path].concat());
+                }
+                let way = self.0[module].brought.get(first).filter(|way| *way != path)?;
+                let way = self.absolute(module, way)?;
+                return Some([way.as_slice(), rest].concat());
+            }
+        }
+        Some([here.as_slice(), rest].concat())
+    }
+
+    /// The module whose file defines the item of a path from the root, through any number of re-exports.
+    fn home(&self, path: &[String]) -> Option<Module> {
+        let depth = (0..=path.len()).rev().find(|depth| self.0.contains_key(&path[..*depth]))?;
+        let (module, rest) = path.split_at(depth);
+        let Some(item) = rest.first() else { return Some(module.to_vec()) };
+        let file = &self.0[module];
+        if file.items.contains(item) {
+            return Some(module.to_vec());
+        }
+        let way = self.absolute(module, file.brought.get(item)?)?;
+        if way == path { None } else { self.home(&way) }
+    }
+
+    /// Which module names an item, or calls a method, of which other.
+    fn edges(&self) -> BTreeSet<(Module, Module)> {
+        let mut of_method = BTreeMap::<&String, Vec<&Module>>::new();
+        for (module, file) in &self.0 {
+            file.methods
+                .iter()
+                .for_each(|method| of_method.entry(method).or_default().push(module));
+        }
+        let mut found = BTreeSet::new();
+        for (module, file) in &self.0 {
+            let paths = named_paths(&file.tokens);
+            let homes = paths.iter().filter_map(|path| self.home(&self.absolute(module, path)?));
+            let mut used: BTreeSet<Module> = homes.collect();
+            for call in file.tokens.windows(4) {
+                let [of, dot, method, open] = call else { continue };
+                let is_call = (dot == "." || dot == "::") && open == "(";
+                let Some(homes) = of_method.get(method).filter(|_| is_call) else { continue };
+                let is_own = of == "self" || of == "Self";
+                if is_own && !file.methods.contains(method) {
+                    let shares = |other: &&&Module| !self.0[**other].types.is_disjoint(&file.types);
+                    used.extend(homes.iter().filter(shares).map(|home| (*home).clone()));
+                } else if let ([home], false) = (homes.as_slice(), is_own) {
+                    // Between modules the floors decide.
+                    let is_near = home.first() == module.first();
+                    if is_near && dot == "." && !METHODS_OF_CORE.contains(&method.as_str()) {
+                        used.insert((*home).clone());
+                    }
+                }
+            }
+            found.extend(
+                used.into_iter()
+                    .filter(|other| other != module)
+                    .map(|other| (module.clone(), other)),
+            );
+        }
+        found
+    }
+
+    /// The circles among the files of each folder: the folder, and the files that use each other, directly or by others. A file counts
+    /// with the folder of its name; the file of the folder itself is `.`.
+    fn circles(&self) -> Vec<(String, String)> {
+        let edges = self.edges();
+        let mut circles = Vec::new();
+        let folders =
+            self.0.keys().flat_map(|module| (0..=module.len()).map(|depth| &module[..depth]));
+        for folder in folders.collect::<BTreeSet<_>>() {
+            let mut reached = BTreeSet::new();
+            for (one, other) in &edges {
+                if let (Some(one), Some(other)) = (node(folder, one), node(folder, other)) {
+                    reached.insert((one, other));
+                }
+            }
+            loop {
+                let further: Vec<_> = reached
+                    .iter()
+                    .flat_map(|(one, by)| {
+                        let next = reached.iter().filter(move |(from, _)| from == by);
+                        next.map(move |(_, other)| (*one, *other))
+                    })
+                    .collect();
+                let before = reached.len();
+                reached.extend(further);
+                if reached.len() == before {
+                    break;
+                }
+            }
+            let nodes: BTreeSet<&str> = reached.iter().map(|(one, _)| *one).collect();
+            let with = |one: &str| -> Vec<&str> {
+                let both = |other: &&&str| {
+                    reached.contains(&(one, **other)) && reached.contains(&(**other, one))
+                };
+                nodes.iter().filter(both).copied().collect()
+            };
+            let groups: BTreeSet<Vec<&str>> = nodes.iter().map(|one| with(one)).collect();
+            let groups = groups.into_iter().filter(|group| group.len() > 1);
+            circles.extend(groups.map(|group| (folder.join("/"), group.join(" "))));
+        }
+        circles
+    }
+}
+
+/// Names of methods of `core`: a call of one is no sign of the file that has such a method too.
+const METHODS_OF_CORE: [&str; 47] = [
+    "abs",
+    "add",
+    "all",
+    "and",
+    "any",
+    "as_str",
+    "chain",
+    "clear",
+    "contains",
+    "count",
+    "fill",
+    "filter",
+    "find",
+    "first",
+    "fold",
+    "get",
+    "get_mut",
+    "index",
+    "insert",
+    "is_empty",
+    "is_finite",
+    "iter",
+    "last",
+    "len",
+    "map",
+    "matches",
+    "max",
+    "min",
+    "next",
+    "nth",
+    "or",
+    "peek",
+    "pop",
+    "position",
+    "push",
+    "remove",
+    "replace",
+    "rev",
+    "saturating_add",
+    "set",
+    "skip",
+    "sort",
+    "sum",
+    "swap",
+    "take",
+    "then",
+    "zip",
+];
+
+/// The circles that are left. Folder, files, reason.
+const CIRCLES: [(&str, &str, &str); 9] = [
+    (
+        "chassis",
+        "steering swerve",
+        "the layout of a swerve chassis and its steering are two files of one type",
+    ),
+    (
+        "control/pid",
+        ". law",
+        "the parts of a step are below both laws, and a loop of errors is a `Pid` for its options",
+    ),
+    (
+        "encoder",
+        ". shaft",
+        "a shaft has a gear, and the turns of a drive are a position: `shaft` has 400 lines",
+    ),
+    ("geometry", "rotation2 rotation3", "each rotation is made from the other"),
+    ("motor/own", ". joint route", "an own motor is configured in `joint`: two files of one type"),
+    ("runner", ". port supervision", "the runner and its settings are two files of one type"),
+    ("runner/watch", ". edge", "the watch and its edges are two files of one type"),
+    (
+        "sim",
+        ". chassis engine esc fault joint line motor port rotor",
+        "a simulated world: its parts know each other",
+    ),
+    ("sim/contract", ". edges rules", "the rules run on the bench that runs the rules"),
+];
+
+#[test]
+fn the_files_of_a_folder_use_each_other_in_one_direction() {
+    let found = House::of_crate().circles();
+    let known = CIRCLES.map(|(folder, files, _)| (folder.to_owned(), files.to_owned()));
+    let new: Vec<_> = found.iter().filter(|circle| !known.contains(circle)).collect();
+    assert!(new.is_empty(), "new circles: {new:#?}");
+    let gone: Vec<_> = known.iter().filter(|circle| !found.contains(circle)).collect();
+    assert!(gone.is_empty(), "no circles any more: {gone:#?}");
+}
+
+#[test]
+fn a_circle_is_found_by_items_by_paths_and_by_methods() {
+    let circles = |files: &[(&str, &str)]| {
+        let files =
+            files.iter().map(|(path, text)| (path.split('/').map(String::from).collect(), *text));
+        House::of(files).circles()
+    };
+    let circle = [("bus".to_owned(), "one two".to_owned())];
+    let one = "use super::two::Two;\npub struct One(Two);";
+    assert_eq!(
+        circles(&[("bus/one", one), ("bus/two", "use super::one::One;\nstruct Two;")]),
+        circle
+    );
+    // By the name that the folder shows, by a path in the code, by a nested `use`.
+    let folder = ("bus", "mod one;\nmod two;\npub use one::One;");
+    assert_eq!(
+        circles(&[folder, ("bus/one", one), ("bus/two", "struct Two;\nfn f(_: super::One) {}")]),
+        circle
+    );
+    let nested = "use crate::{bus::{self, one}, other};\nstruct Two(one::One);";
+    assert_eq!(circles(&[folder, ("bus/one", one), ("bus/two", nested)]), circle);
+    // By a method of its type in the other file, and by a method that nothing else has.
+    let own = "use super::two::Two;\nimpl Two {\n    pub fn turn(&self) {}\n}";
+    let two = |call| format!("pub struct Two;\nimpl Two {{\n    fn f(&self) {{ {call} }}\n}}");
+    assert_eq!(circles(&[("bus/one", own), ("bus/two", &two("self.turn()"))]), circle);
+    assert_eq!(circles(&[("bus/one", own), ("bus/two", &two("other.turn()"))]), circle);
+    // A file with the folder of its name.
+    let inner = [
+        ("bus/slot", "mod part;\nuse part::Part;\nstruct Slot(Part);"),
+        ("bus/slot/part", "use super::Slot;\nstruct Part;"),
+    ];
+    assert_eq!(circles(&inner), [("bus/slot".to_owned(), ". part".to_owned())]);
+    // One direction, a test, a comment, and a type of the same name elsewhere are none.
+    let test = "struct Two;\n// super::one::One\n#[cfg(test)]\nmod tests {\n    use super::super::one::One;\n}";
+    let elsewhere = "use crate::motor::One;\nstruct Two(One);";
+    for two in ["struct Two;", test, elsewhere] {
+        assert!(circles(&[folder, ("bus/one", one), ("bus/two", two)]).is_empty(), "{two}");
+    }
 }

@@ -1,12 +1,12 @@
 //! Attaching, arming and detaching of motors, the conditions that forbid arming, and the load of the bus.
 
 use super::config::PlainConfig;
-use super::motors::{FIRST_FEEDBACK_ID, Key, Motors};
+use super::motors::{FIRST_FEEDBACK_ID, Motors};
 use super::outbox::{Outbox, Place};
 use super::slot::config::configured;
-use super::slot::{Slot, health};
+use super::slot::{Key, Slot, health};
 use super::{AttachError, Facts};
-use crate::motor::{ArmError, BusLoad, Claim, Condition, Missing, MotorName, Role};
+use crate::motor::{ArmError, BusLoad, Claim, Condition, MotorName, Obstacles, Role};
 use crate::time::Instant;
 use core::ops::Range;
 use embedded_can::StandardId;
@@ -112,26 +112,19 @@ pub(super) fn arm_only<const N: usize>(
     chosen: impl Iterator<Item = Key> + Clone,
     now: Instant,
 ) -> Result<(), ArmError> {
-    motors.guard.ask();
-    if motors.guard.is_stopped() {
-        return Err(ArmError::Stopped);
+    let (granted, is_stopped) = (motors.guard.ask(), motors.guard.is_stopped());
+    Obstacles::check(is_stopped, granted, |found| {
+        let slots = || chosen.clone().filter_map(|motor| motors.get(motor));
+        let missing = slots().filter(|slot| motors.guard.misses(&slot.guard, now));
+        let faulty = slots().filter(|slot| health::is_faulty(slot));
+        found.has_motors = slots().next().is_some();
+        found.missing.extend(missing.filter_map(Slot::name));
+        found.second_master = rival_among(slots());
+        found.faulty.extend(faulty.filter_map(Slot::name));
+    })?;
+    if !motors.guard.begin_arming(now) {
+        return Ok(());
     }
-    let slots = || chosen.clone().filter_map(|motor| motors.get(motor));
-    if slots().next().is_none() {
-        return Err(ArmError::NoMotors);
-    }
-    let missing = slots().filter(|slot| motors.guard.misses(&slot.guard, now));
-    if let Some(missing) = Missing::collect(missing.filter_map(Slot::name)) {
-        return Err(ArmError::Missing(missing));
-    }
-    if let Some(claim) = rival_among(slots()) {
-        return Err(ArmError::SecondMaster(claim));
-    }
-    let faulty = slots().filter(|slot| health::is_faulty(slot));
-    if let Some(faulty) = Missing::collect(faulty.filter_map(Slot::name)) {
-        return Err(ArmError::Faulty(faulty));
-    }
-    motors.guard.begin_arming(now)?;
     for motor in chosen {
         if motors.get(motor).is_some() {
             let place = motor.place();

@@ -1,6 +1,7 @@
 use super::attach::Budget;
-use super::motors::{FIRST_FEEDBACK_ID, IDS, Key, Motors, is_of_others};
+use super::motors::{FIRST_FEEDBACK_ID, IDS, Motors, is_of_others};
 use super::outbox::Outbox;
+use super::slot::Key;
 use super::watch::{Counters, Rejects};
 use super::{AnyHandle, AttachError, Config, Feedback, Handle, Model, attach, watch};
 use crate::frame::CanFrame;
@@ -323,7 +324,10 @@ impl<B, const N: usize> Bus<B, N> {
         self.check_next();
         let mut rest = self.motors.taken_mut();
         while let [slot, others @ ..] = rest {
-            let raw = slot.update(&step, tick.dt_s(), &self.outbox);
+            let raw = match slot.update(&step, tick.dt_s()) {
+                Some(raw) => raw,
+                None => slot.update_carefully(tick.dt_s(), &self.outbox),
+            };
             self.outbox.put(slot.place, raw);
             rest = others;
         }

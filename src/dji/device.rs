@@ -75,7 +75,7 @@ impl<B, const N: usize> CanDevice for Bus<B, N> {
     }
 
     fn engage(&mut self, now: Instant) {
-        if !self.motors.guard.is_far(now) && self.motors.guard.begin_arming(now).is_ok() {
+        if !self.motors.guard.is_far(now) && self.motors.guard.begin_arming(now) {
             let all = 0..self.motors.used;
             attach::engage(&mut self.motors, all, now);
             attach::keep_trip_of_others(&mut self.motors);
@@ -113,6 +113,12 @@ impl Default for Bus {
         Self::new()
     }
 }
+
+#[cfg(target_pointer_width = "32")]
+const _: () = {
+    assert!(size_of::<super::slot::Slot>() <= 296 && size_of::<Bus>() <= 3600);
+    assert!(size_of::<Bus<(), 8>>() <= 2800 && size_of::<Bus<(), 1>>() <= 640);
+};
 
 impl<M: Model, B, const N: usize> VelocityDrive<Handle<M, B>> for Bus<B, N> {
     fn velocity(&self, motor: Handle<M, B>) -> Option<AngularVelocity> {
@@ -178,6 +184,6 @@ fn velocity<B, const N: usize>(bus: &Bus<B, N>, motor: AnyHandle<B>) -> Option<A
 
 /// Returns the measured angle of a motor that is online, if its absolute angle is known.
 fn angle<B, const N: usize>(bus: &Bus<B, N>, motor: AnyHandle<B>) -> Option<Angle> {
-    let state = bus.motors.get(motor.key())?.state()?;
+    let state = health::state(bus.motors.get(motor.key())?)?;
     (state.link == Link::Online && state.homing.is_known()).then(|| state.position.angle())
 }

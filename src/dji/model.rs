@@ -1,5 +1,5 @@
 use super::CommandFrame;
-use super::codec::{ErrorTable, to_raw};
+use super::codec::{ErrorTable, Range, to_raw};
 use crate::encoder::GearRatio;
 use crate::motor::Capability;
 use crate::units::{Current, Voltage};
@@ -235,59 +235,6 @@ models! {
     Gm6020Voltage, GM6020_VOLTAGE_FACTS, Voltage;
     /// The GM6020 with current control switched on in RoboMaster Assistant.
     Gm6020Current, GM6020_CURRENT_FACTS, Current;
-}
-
-/// Allowed raw commands of a motor: all commands between two ends. The range includes 0.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Range {
-    lowest: i16,
-    span: u16,
-}
-
-impl Range {
-    /// Only 0.
-    pub(super) const ZERO: Self = Self::within(0);
-
-    /// Both directions up to `limit`, which must not be negative.
-    pub(super) const fn within(limit: i16) -> Self {
-        Self { lowest: -limit, span: 2 * limit.cast_unsigned() }
-    }
-
-    pub(super) const fn without_negative(self) -> Self {
-        Self { lowest: 0, span: self.highest().cast_unsigned() }
-    }
-
-    pub(super) const fn without_positive(self) -> Self {
-        Self { lowest: self.lowest, span: self.lowest.unsigned_abs() }
-    }
-
-    /// Tells whether a command is within the range. One comparison covers both ends: as unsigned, a value below the lowest is far above.
-    #[inline]
-    pub(super) const fn contains(self, raw: i32) -> bool {
-        raw.wrapping_sub(self.lowest as i32).cast_unsigned() <= self.span as u32
-    }
-
-    /// Tells whether a command is not 0 and at an end of the range.
-    pub(super) const fn is_end(self, raw: i16) -> bool {
-        (raw < 0 && raw <= self.lowest) || (raw > 0 && raw >= self.highest())
-    }
-
-    /// Returns the nearest command within the range.
-    pub(super) const fn nearest(self, raw: i32) -> i16 {
-        if raw < self.lowest as i32 {
-            return self.lowest;
-        }
-        if raw > self.highest() as i32 {
-            return self.highest();
-        }
-        #[expect(clippy::cast_possible_truncation, reason = "between two of 16 bits")]
-        let raw = raw as i16;
-        raw
-    }
-
-    const fn highest(self) -> i16 {
-        self.lowest.wrapping_add_unsigned(self.span)
-    }
 }
 
 #[cfg(test)]

@@ -1,11 +1,11 @@
 //! Motors of a bus in their slots, and the handles of motors.
 
 use super::outbox::Outbox;
-use super::slot::Slot;
-use super::watch::Rounds;
+use super::slot::health::Rounds;
+use super::slot::{Key, Slot};
 use super::{CommandFrame, Model};
 use crate::frame::CanFrame;
-use crate::motor::{DeviceGuard, LONGEST_PAUSE, TargetError};
+use crate::motor::{DeviceGuard, TargetError};
 use crate::time::Instant;
 use crate::units::{Angle, AngularVelocity};
 use core::marker::PhantomData;
@@ -222,11 +222,7 @@ impl<const N: usize> Motors<N> {
         at: Instant,
     ) -> Result<(), TargetError> {
         let guard = &self.guard;
-        let (now, updated, timeouts) = (guard.now(), guard.updated(), *guard.timeouts());
-        // A 32-bit stamp alone would be fresh again every 71 minutes.
-        let is_ahead = guard.is_running() && at.since(updated) > LONGEST_PAUSE;
-        let is_far = is_ahead || updated.since(at) > timeouts.measured();
-        let at = (!is_far).then(|| at.stamp());
+        let (now, timeouts, at) = (guard.now(), *guard.timeouts(), guard.stamp_of(at));
         self.change_present(motor, |slot| {
             slot.set_measured(way.as_radians(), velocity.as_rad_per_s(), at, now, &timeouts)
         })?;
@@ -262,12 +258,6 @@ const fn cut(raw: i16, factor: f32) -> i16 {
     0
 }
 
-#[cfg(target_pointer_width = "32")]
-const _: () = {
-    assert!(size_of::<Slot>() <= 296 && size_of::<super::Bus>() <= 3600);
-    assert!(size_of::<super::Bus<(), 8>>() <= 2800 && size_of::<super::Bus<(), 1>>() <= 640);
-};
-
 /// Names a motor of a bus: one byte, `Copy`, with the model as a type.
 ///
 /// `B` is the brand of the bus ([`Bus::branded`](super::Bus::branded)); handles of differently branded buses do not mix. A handle of a
@@ -281,33 +271,6 @@ pub struct Handle<M: Model, B = ()> {
 pub struct AnyHandle<B = ()> {
     key: Key,
     brand: PhantomData<fn() -> B>,
-}
-
-/// Slot index in the low half, generation in the high half.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Key(u8);
-
-impl Key {
-    pub(super) const GENERATIONS: u8 = 16;
-    /// Names no slot: there are 11.
-    pub(super) const NONE: Self = Self(0xFF);
-
-    pub(super) const fn new(index: u8, generation: u8) -> Self {
-        Self(generation << 4 | (index & 15))
-    }
-
-    pub(super) const fn index(self) -> usize {
-        (self.0 & 15) as usize
-    }
-
-    /// Returns the index as a byte.
-    pub(super) const fn place(self) -> u8 {
-        self.0 & 15
-    }
-
-    pub(super) const fn generation(self) -> u8 {
-        self.0 >> 4
-    }
 }
 
 impl<M: Model, B> Handle<M, B> {

@@ -1,4 +1,4 @@
-//! One motor in a tick: from feedback and target through the loops to the raw command.
+//! One motor in a tick: feedback, targets of the same kind, loops, and the short check.
 //!
 //! Less frequent tasks of a motor are in the files of the folder.
 
@@ -7,26 +7,50 @@ pub(super) mod gap;
 pub(super) mod health;
 mod target;
 
-use super::codec::{free_to_raw, loop_to_raw, saturate};
+use super::codec::{Range, free_to_raw, loop_to_raw, saturate};
 use super::config::USUAL;
-use super::model::Range;
-use super::motors::Key;
-use super::outbox::{Outbox, Place};
-use super::{Facts, Feedback, State};
+use super::outbox::Place;
+use super::{Facts, Feedback};
 use crate::control::{ErrorPid, Pid, PidConfig};
 use crate::encoder::{GearRatio, Homing, Position, Shaft, shortest};
 use crate::error::ConfigError;
-use crate::motor::{HealthConfig, Link, Monitor, MotorGuard, MotorName, TargetError, Traffic};
+use crate::motor::{HealthConfig, Link, Monitor, MotorGuard, MotorName, Traffic};
 use crate::time::TimeStep;
-use crate::units::{AngularVelocity, Current};
+use crate::units::AngularVelocity;
 
 /// The refusal of a handle of a detached motor.
 pub(super) const DETACHED: ConfigError = ConfigError::Unusable("handle of a detached motor");
 pub(super) use health::Surroundings;
-use target::{Action, Duty};
 
 /// Current of a motor that does not drive itself: a fifth of the full scale of the smallest ESC.
 const CALM_CURRENT: i32 = 2_000;
+
+/// Slot index in the low half, generation in the high half.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Key(u8);
+
+impl Key {
+    pub(super) const GENERATIONS: u8 = 16;
+    /// Names no slot: there are 11.
+    pub(super) const NONE: Self = Self(0xFF);
+
+    pub(super) const fn new(index: u8, generation: u8) -> Self {
+        Self(generation << 4 | (index & 15))
+    }
+
+    pub(super) const fn index(self) -> usize {
+        (self.0 & 15) as usize
+    }
+
+    /// Returns the index as a byte.
+    pub(super) const fn place(self) -> u8 {
+        self.0 & 15
+    }
+
+    pub(super) const fn generation(self) -> u8 {
+        self.0 >> 4
+    }
+}
 
 #[derive(Debug, Clone, Copy)]
 // In the order of use, so that neighbours are loaded and stored together.
@@ -65,6 +89,43 @@ pub(super) struct Slot {
     traffic: Traffic,
 }
 
+/// Action set by the target of a motor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+enum Action {
+    Rest,
+    Raw,
+    Velocity,
+    /// By the shortest way.
+    Angle,
+    Position,
+    /// By the remaining way that another sensor measures.
+    Measured,
+}
+
+impl Action {
+    /// Tells whether the action goes to a position of the shaft.
+    const fn is_way(self) -> bool {
+        matches!(self, Self::Angle | Self::Position)
+    }
+}
+
+/// Task of an update: the action itself in the usual, simple case.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+enum Duty {
+    Rest,
+    /// The first run of any action since a rest.
+    First,
+    Raw,
+    /// The speed loop, plain and with the full output: its own limit is enough.
+    Velocity,
+    /// Both loops, as above.
+    Position,
+    /// Any other action, within the available output; also the first run of an action in place of another.
+    Other,
+}
+
 /// Goal of an action, separate from the action, so that an update tests only one byte.
 #[derive(Debug, Clone, Copy)]
 struct Goal {
@@ -81,20 +142,8 @@ impl Goal {
         Self { turns: 0, value }
     }
 
-    const fn raw(&self) -> i32 {
-        self.value
-    }
-
     const fn rad_per_s(&self) -> f32 {
         f32::from_bits(self.value.cast_unsigned())
-    }
-
-    const fn phase(&self) -> i32 {
-        self.value
-    }
-
-    const fn turns(&self) -> u32 {
-        self.turns
     }
 
     /// A way in rad, and its rate in rad/s.
@@ -205,36 +254,8 @@ impl Slot {
         before + self.place.slot() + 1
     }
 
-    /// Returns the state; `None` before the first frame.
-    // Inline only: the compiler then drops the fields without a reader.
-    #[inline(always)]
-    pub(super) fn state(&self) -> Option<State> {
-        let facts = self.facts?;
-        if self.guard.link() == Link::Unheard {
-            return None;
-        }
-        let amperes =
-            self.direction() * f32::from(self.feedback.current()) * facts.current_full_scale_a
-                / f32::from(facts.current_raw);
-        Some(State {
-            motor: MotorName::new(facts.name, self.id(facts)),
-            position: self.shaft.position(),
-            homing: self.homing,
-            velocity: self.velocity(),
-            current: Current::from_amperes(amperes),
-            torque_nm: amperes * self.nm_per_a,
-            temperature_c: facts
-                .has_temperature
-                .then_some(health::celsius(self.feedback.temperature())),
-            error: facts.errors.read(self.feedback.error()),
-            rotor_counts: self.shaft.rotor_counts(),
-            ambiguous_gaps: self.ambiguous_gaps,
-            refused_targets: self.guard.refused_targets(),
-            forgotten_targets: self.guard.forgotten_targets(),
-            conditions: self.guard.latch().active(),
-            link: self.guard.link(),
-            feedback: self.feedback,
-        })
+    fn direction(&self) -> f32 {
+        1.0_f32.copysign(self.raw_per_unit)
     }
 
     /// Handles a time that did not move on. A free slot loses nothing.
@@ -293,6 +314,44 @@ impl Slot {
 
     // Update.
 
+    /// Runs the loops of this motor and returns its raw command; `None` outside of the usual path, where the caller
+    /// [updates carefully](Self::update_carefully). `step` is the step of `dt_s`: only the usual path uses `step`, so the step stays in
+    /// registers.
+    #[inline(always)]
+    pub(super) fn update(&mut self, step: &TimeStep, dt_s: f32) -> Option<i16> {
+        let velocity = self.velocity().as_rad_per_s();
+        let goal = match self.duty {
+            Duty::Velocity => self.goal.rad_per_s(),
+            Duty::Position => {
+                let way = self.shaft.way_to(self.goal.turns, self.goal.value);
+                match self.position.plain(way, velocity, step) {
+                    Ok(goal) => goal,
+                    Err(_) => return None,
+                }
+            }
+            Duty::Raw => return Some(saturate(self.goal.value, self.range)),
+            // Out of line too: inline, every update of every motor would load a zero for these.
+            Duty::Rest | Duty::First | Duty::Other => return None,
+        };
+        Some(match self.speed.plain(goal, velocity, step) {
+            Ok(output) => free_to_raw(output, self.raw_per_unit),
+            Err(_) => self.follow_velocity(goal, velocity, dt_s),
+        })
+    }
+
+    // Cold, so that the usual path runs straight on. Loops with options also come here, with no other cost.
+    #[cold]
+    #[inline(never)]
+    fn follow_velocity(&mut self, goal: f32, velocity: f32, dt_s: f32) -> i16 {
+        let output = self.speed.step(goal, velocity, &TimeStep::of_motor(dt_s));
+        loop_to_raw(output, self.raw_per_unit, self.range)
+    }
+
+    /// Requires full checks of the motor until all is [well](health::waive_check) again.
+    const fn require_check(&mut self) {
+        self.cool_below = 0;
+    }
+
     /// Checks a motor in the usual state: online, cool, turning, no condition and no error. Returns `false` if another state is possible:
     /// the motor must then be [checked](health::check) in full. `elapsed` is the time since its last check, in units of 1.024 ms.
     #[inline(always)]
@@ -306,47 +365,25 @@ impl Slot {
             return false;
         }
         if !is_within(driven, calm) {
-            return health::is_driven_well(self, facts, word, elapsed);
+            return is_driven_well(self, facts, word, elapsed);
         }
         (is_within(feedback.current().into(), CALM_CURRENT) || !is_within(driven, calm / 4))
             && self.monitor.follow(feedback.angle(), coarse(word))
     }
-
-    /// Runs the loops of this motor and returns its raw command. `step` is the step of `dt_s`: only the usual path uses `step`, so the step
-    /// stays in registers.
-    #[inline(always)]
-    pub(super) fn update(&mut self, step: &TimeStep, dt_s: f32, sent: &Outbox) -> i16 {
-        let velocity = self.velocity().as_rad_per_s();
-        let goal = match self.duty {
-            Duty::Velocity => self.goal.rad_per_s(),
-            Duty::Position => {
-                let way = self.shaft.way_to(self.goal.turns(), self.goal.phase());
-                match self.position.plain(way, velocity, step) {
-                    Ok(goal) => goal,
-                    Err(_) => return self.update_carefully(dt_s, sent),
-                }
-            }
-            Duty::Raw => return saturate(self.goal.raw(), self.range),
-            // Out of line too: inline, every update of every motor would load a zero for these.
-            Duty::Rest | Duty::First | Duty::Other => return self.update_carefully(dt_s, sent),
-        };
-        match self.speed.plain(goal, velocity, step) {
-            Ok(output) => free_to_raw(output, self.raw_per_unit),
-            Err(_) => self.follow_velocity(goal, velocity, dt_s),
-        }
-    }
-
-    // Cold, so that the usual path runs straight on. Loops with options also come here, with no other cost.
-    #[cold]
-    #[inline(never)]
-    fn follow_velocity(&mut self, goal: f32, velocity: f32, dt_s: f32) -> i16 {
-        let output = self.speed.step(goal, velocity, &TimeStep::of_motor(dt_s));
-        loop_to_raw(output, self.raw_per_unit, self.range)
-    }
 }
 
-fn needs(is_there: bool) -> Result<(), TargetError> {
-    if is_there { Ok(()) } else { Err(TargetError::NoLoop) }
+/// As [`check`](health::check), for a motor that is well and driven hard: cool, no condition, no error. Returns `false` if a stall, runaway or frozen
+/// feedback may begin.
+#[inline(never)]
+fn is_driven_well(slot: &mut Slot, facts: &Facts, word: i16, elapsed: u8) -> bool {
+    let speed = f32::from(slot.feedback.rpm()) / f32::from(facts.rotor_no_load_rpm());
+    let effort = f32::from(word) / f32::from(slot.full_limit);
+    let angle = slot.feedback.angle();
+    if !slot.monitor.follow_driven(angle, coarse(word), (effort, speed), elapsed, slot.health) {
+        return false;
+    }
+    slot.saturated = slot.saturated.saturating_add(u16::from(slot.range.is_end(word)));
+    true
 }
 
 /// Tells whether a value is within ±`limit`, with a tolerance of 1 and one comparison for both ends; with a limit of 0, no value is within.

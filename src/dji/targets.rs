@@ -20,7 +20,7 @@ impl<B, const N: usize> Bus<B, N> {
     #[must_use]
     #[inline(always)]
     pub fn state(&self, motor: impl Into<AnyHandle<B>>) -> Option<State> {
-        self.motors.get(motor.into().key())?.state()
+        health::state(self.motors.get(motor.into().key())?)
     }
 
     /// Returns the link of a motor; `None` for a detached motor.

@@ -6,10 +6,11 @@
 
 use super::motors::{FIRST_FEEDBACK_ID, IDS, Motors};
 use super::outbox::Outbox;
+use super::slot::health::Rounds;
 use super::slot::{Slot, Surroundings, gap, health};
 use super::{CommandFrame, Feedback};
 use crate::frame::CanFrame;
-use crate::motor::{Ages, Condition, Hold, Ingest, Malformed, MotorName, Rival, Traffic, elapsed};
+use crate::motor::{Ages, Condition, Hold, Ingest, Malformed, MotorName, Rival};
 use crate::time::{Edge, Instant};
 
 /// Takes any frame.
@@ -159,64 +160,6 @@ pub(super) fn hold<const N: usize>(
     }
     outbox.keep_alive(motors.guard.now());
     outbox.finish_update();
-}
-
-/// The motor to check next, and the times of the round.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Rounds {
-    /// Begin of the present counting window.
-    window_from: u32,
-    /// Time of the last command frame of another node.
-    rival_heard: u32,
-    /// Begin of the present round.
-    begun: u32,
-    /// The rate of each motor's feedback, as configured.
-    pub(super) feedback_hz: u32,
-    /// The length of the window that ends in this round, in units of 1.024 ms.
-    window: u16,
-    /// The length of the previous round.
-    pub(super) elapsed: u8,
-    /// Place of the motor to check next; in a round that ends a window, beyond [`CLOSING`](Self::CLOSING).
-    pub(super) next: u8,
-    has_begun: bool,
-    /// Whether sent frames are received again.
-    pub(super) echoes: bool,
-}
-
-impl Rounds {
-    pub(super) const NEW: Self = Self {
-        window_from: 0,
-        rival_heard: 0,
-        begun: 0,
-        feedback_hz: 1_000,
-        window: 0,
-        elapsed: 0,
-        next: 0,
-        has_begun: false,
-        echoes: false,
-    };
-
-    /// In a round that ends a window, each motor is checked in full: no slot has such a number, so the quick check is skipped.
-    const CLOSING: u8 = 0x80;
-
-    /// Returns the length of the window that ends in this round; `None` if no window ends.
-    const fn window(&self) -> Option<u16> {
-        if self.next & Self::CLOSING != 0 { Some(self.window) } else { None }
-    }
-
-    /// Begins a new round: one tick for each place, and one for this call.
-    fn begin(&mut self, now: u32) {
-        self.elapsed = elapsed(Some(now.wrapping_sub(self.begun)));
-        self.begun = now;
-        let elapsed = now.wrapping_sub(self.window_from);
-        let closes_window = self.has_begun && u64::from(elapsed) >= Traffic::WINDOW.as_micros();
-        self.next = if closes_window { Self::CLOSING } else { 0 };
-        if closes_window || !self.has_begun {
-            self.window = u16::try_from(elapsed >> 10).unwrap_or(u16::MAX);
-            self.window_from = now;
-            self.has_begun = true;
-        }
-    }
 }
 
 /// Checks a motor in a round that ends a window, or begins a round.

@@ -1,5 +1,7 @@
-//! Reasons against arming: missing motors, settings that differ, and all others.
+//! Reasons against arming: missing motors, settings that differ, and all others; and the order in which a request is refused.
 
+#[cfg(feature = "hal")]
+use super::Guard;
 use super::{BusLoad, Claim, MotorName};
 
 /// The motors that prevent arming, by name.
@@ -18,18 +20,22 @@ impl Missing {
     /// Collects names; `None` without any.
     pub fn collect(names: impl Iterator<Item = MotorName>) -> Option<Self> {
         let mut missing = Self::NONE;
-        names.for_each(|name| missing.add(name));
+        missing.extend(names);
         (missing.total > 0).then_some(missing)
     }
 
-    pub(super) const NONE: Self = Self { names: [None; Self::CAPACITY], total: 0, full_bus: None };
+    pub(crate) fn extend(&mut self, names: impl Iterator<Item = MotorName>) {
+        names.for_each(|name| self.add(name));
+    }
+
+    const NONE: Self = Self { names: [None; Self::CAPACITY], total: 0, full_bus: None };
 
     /// Keeps the load of the bus if the bus may be full.
-    pub(crate) fn on_bus(self, load: Option<BusLoad>) -> Self {
+    fn on_bus(self, load: Option<BusLoad>) -> Self {
         Self { full_bus: load.and_then(BusLoad::of_full_bus), ..self }
     }
 
-    pub(super) fn add(&mut self, name: MotorName) {
+    fn add(&mut self, name: MotorName) {
         if let Some(place) = self.names.get_mut(usize::from(self.total)) {
             *place = Some(name);
         }
@@ -118,6 +124,108 @@ impl core::fmt::Display for ArmError {
 }
 
 impl core::error::Error for ArmError {}
+
+impl ArmError {
+    /// Returns the refusal for a reason around the devices: a set emergency stop, or a driver that takes no frames.
+    pub(crate) const fn around(is_stopped: bool, is_bus_down: bool) -> Option<Self> {
+        if is_stopped {
+            Some(Self::Stopped)
+        } else if is_bus_down {
+            Some(Self::BusDown)
+        } else {
+            None
+        }
+    }
+
+    /// Keeps the load of the bus for motors that are missing, if the bus may be full.
+    pub(crate) fn on_bus(self, load: Option<BusLoad>) -> Self {
+        match self {
+            Self::Missing(missing) => Self::Missing(missing.on_bus(load)),
+            other => other,
+        }
+    }
+}
+
+/// What stands against arming some motors, beside the emergency stop.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Obstacles {
+    pub(crate) has_motors: bool,
+    pub(crate) clash: Option<(Claim, Claim)>,
+    pub(crate) missing: Missing,
+    pub(crate) second_master: Option<Claim>,
+    pub(crate) faulty: Missing,
+    pub(crate) wrong_setting: Option<WrongSetting>,
+}
+
+impl Obstacles {
+    /// Nothing stands against arming one motor.
+    pub(crate) const NONE: Self = Self {
+        has_motors: true,
+        clash: None,
+        missing: Missing::NONE,
+        second_master: None,
+        faulty: Missing::NONE,
+        wrong_setting: None,
+    };
+
+    /// Checks a request to arm. The reasons against arming come in this order, for all devices: the emergency stop, no motor, a clash of
+    /// ids, another setting, missing feedback, a second master, a fault, a setting not known yet, and a request that is
+    /// [not granted](crate::motor::safety::DeviceGuard::ask). If the stop is set, `survey` is not called.
+    ///
+    /// # Errors
+    /// The first reason.
+    pub(crate) fn check(
+        is_stopped: bool,
+        granted: bool,
+        survey: impl FnOnce(&mut Self),
+    ) -> Result<(), ArmError> {
+        if is_stopped {
+            return Err(ArmError::Stopped);
+        }
+        let mut found = Self::NONE;
+        survey(&mut found);
+        found.refusal(granted)
+    }
+
+    /// As [`check`](Self::check) for one motor outside of the devices: takes the request. `missing` is the motor, if its feedback is
+    /// [missing](super::Guard::is_missing).
+    ///
+    /// # Errors
+    /// The first reason.
+    #[cfg(feature = "hal")]
+    pub(crate) fn check_one(guard: &mut Guard, missing: Option<MotorName>) -> Result<(), ArmError> {
+        let (granted, is_stopped) = (guard.ask(), guard.is_stopped());
+        Self::check(is_stopped, granted, |found| found.missing.extend(missing.into_iter()))
+    }
+
+    // In order, and by reference: a refusal has the size of twelve names.
+    #[inline(never)]
+    fn refusal(&self, granted: bool) -> Result<(), ArmError> {
+        if !self.has_motors {
+            return Err(ArmError::NoMotors);
+        }
+        if let Some((one, other)) = self.clash {
+            return Err(ArmError::Clash(one, other));
+        }
+        // A drive set up for other commands may answer none of ours.
+        if let Some(wrong) = self.wrong_setting.filter(|wrong| wrong.found.is_some()) {
+            return Err(ArmError::Setting(wrong));
+        }
+        if self.missing.total > 0 {
+            return Err(ArmError::Missing(self.missing));
+        }
+        if let Some(claim) = self.second_master {
+            return Err(ArmError::SecondMaster(claim));
+        }
+        if self.faulty.total > 0 {
+            return Err(ArmError::Faulty(self.faulty));
+        }
+        if let Some(wrong) = self.wrong_setting {
+            return Err(ArmError::Setting(wrong));
+        }
+        if granted { Ok(()) } else { Err(ArmError::NotReleased) }
+    }
+}
 
 /// A setting of a drive that prevents arming: the setting differs from the expected value, or is not known.
 ///

@@ -1,6 +1,6 @@
 //! A device, and actions on every device of several: one visitor for each action.
 
-use super::{Claim, Condition, Devices, Missing, MotorName, Role, WrongSetting};
+use super::{Claim, Condition, MotorName, Obstacles, Role, WrongSetting};
 use crate::frame::CanFrame;
 use crate::time::{Edge, Instant, Tick};
 use core::ops::Range;
@@ -8,7 +8,7 @@ use embedded_can::Frame;
 
 /// A device family on a CAN bus: the interface between its motors and the transport of their frames.
 ///
-/// [`Devices`] is the side of the caller: a runner, an async task, a test. A type with this trait implements
+/// [`Devices`](super::Devices) is the side of the caller: a runner, an async task, a test. A type with this trait implements
 /// `Devices` by a line, `visitor.visit(self)`.
 ///
 /// No method has a body here. A device with a missing method does not compile:
@@ -277,37 +277,26 @@ impl Visitor for Rival {
     }
 }
 
-pub(super) struct Obstacles {
+/// Collects what stands against arming.
+pub(super) struct Survey<'a> {
     pub(super) now: Instant,
-    pub(super) missing: Missing,
-    pub(super) second_master: Option<Claim>,
-    pub(super) faulty: Missing,
-    pub(super) wrong_setting: Option<WrongSetting>,
+    pub(super) found: &'a mut Obstacles,
 }
 
-impl Visitor for Obstacles {
+impl Visitor for Survey<'_> {
     #[inline]
     fn visit(&mut self, device: &mut impl CanDevice) {
-        device.missing(self.now).for_each(|motor| self.missing.add(motor));
-        device.faulty().for_each(|motor| self.faulty.add(motor));
-        self.wrong_setting = self.wrong_setting.or_else(|| device.wrong_setting());
-        self.second_master = self.second_master.or_else(|| device.second_master());
+        let found = &mut *self.found;
+        found.missing.extend(device.missing(self.now));
+        found.faulty.extend(device.faulty());
+        found.wrong_setting = found.wrong_setting.or_else(|| device.wrong_setting());
+        found.second_master = found.second_master.or_else(|| device.second_master());
     }
 }
 
-/// Hands a request to arm to every device.
-pub(crate) struct Ask {
+/// Hands a request to arm to every device, and tells whether the request counts for all of them.
+pub(super) struct Ask {
     pub(super) granted: bool,
-}
-
-impl Ask {
-    /// Returns whether the request counts for all of them. A caller with a refusal of its own passes the request on
-    /// too.
-    pub(crate) fn of(devices: &mut (impl Devices + ?Sized)) -> bool {
-        let mut ask = Self { granted: true };
-        devices.visit(&mut ask);
-        ask.granted
-    }
 }
 
 impl Visitor for Ask {

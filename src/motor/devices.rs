@@ -1,10 +1,10 @@
 //! One device or several, as seen by their caller.
 
 use super::device::{
-    Ask, Back, ClearStop, Disarm, Engage, Nth, Obstacles, Offer, Parts, PutBack, Read, Rival,
-    Search, Standing, Stop, Superseded, Trip, Update, Visitor,
+    Ask, Back, ClearStop, Disarm, Engage, Nth, Offer, Parts, PutBack, Read, Rival, Search,
+    Standing, Stop, Superseded, Survey, Trip, Update, Visitor,
 };
-use super::{ArmError, Claim, Condition, Ingest, Missing, MotorName};
+use super::{ArmError, Claim, Condition, Ingest, MotorName, Obstacles};
 use crate::frame::CanFrame;
 use crate::time::{Edge, Instant, Tick};
 
@@ -157,39 +157,12 @@ pub trait Devices {
     /// Names the reason: motors without feedback, a CAN id with two owners or two senders, a fault, a drive with other settings,
     /// a set emergency stop, a request not released since a trip.
     fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
-        let granted = Ask::of(self);
-        if self.is_stopped() {
-            return Err(ArmError::Stopped);
-        }
-        if self.claims().next().is_none() {
-            return Err(ArmError::NoMotors);
-        }
-        if let Some((one, other)) = self.clash() {
-            return Err(ArmError::Clash(one, other));
-        }
-        let (missing, faulty) = (Missing::NONE, Missing::NONE);
-        let mut obstacles =
-            Obstacles { now, missing, second_master: None, faulty, wrong_setting: None };
-        self.visit(&mut obstacles);
-        // A drive set up for other commands may answer none of ours.
-        if let Some(wrong) = obstacles.wrong_setting.filter(|wrong| wrong.found.is_some()) {
-            return Err(ArmError::Setting(wrong));
-        }
-        if obstacles.missing.total() > 0 {
-            return Err(ArmError::Missing(obstacles.missing));
-        }
-        if let Some(claim) = obstacles.second_master {
-            return Err(ArmError::SecondMaster(claim));
-        }
-        if obstacles.faulty.total() > 0 {
-            return Err(ArmError::Faulty(obstacles.faulty));
-        }
-        if let Some(wrong) = obstacles.wrong_setting {
-            return Err(ArmError::Setting(wrong));
-        }
-        if !granted {
-            return Err(ArmError::NotReleased);
-        }
+        let (granted, is_stopped) = (ask(self), self.is_stopped());
+        Obstacles::check(is_stopped, granted, |found| {
+            found.has_motors = self.claims().next().is_some();
+            found.clash = self.clash();
+            self.visit(&mut Survey { now, found });
+        })?;
         self.visit(&mut Engage(now));
         Ok(())
     }
@@ -228,6 +201,14 @@ pub trait Devices {
         self.visit(&mut standing);
         standing.stopped
     }
+}
+
+/// Hands a request to arm to every device; returns whether the request counts for all of them. A caller with a refusal of its own passes
+/// the request on too.
+pub(crate) fn ask(devices: &mut (impl Devices + ?Sized)) -> bool {
+    let mut ask = Ask { granted: true };
+    devices.visit(&mut ask);
+    ask.granted
 }
 
 impl<D: Devices> Devices for &mut D {

@@ -1,6 +1,7 @@
 //! Rules of a motor that is a device by itself.
 
-use super::safety::{DeviceGuard, MotorGuard, OPENING, age};
+use super::age;
+use super::safety::{DeviceGuard, MotorGuard, OPENING};
 use crate::motor::{Condition, Conditions, Health, Latch, Link, MotorName, TargetError, Timeouts};
 use crate::time::{Duration, Edge, Instant};
 
@@ -183,6 +184,12 @@ impl Guard {
         self.motor.open(self.device.now());
     }
 
+    /// Tells whether the time of the last update moved on. If not, the length of nothing that lasts until now is known.
+    #[cfg(feature = "hal")]
+    pub(crate) const fn knows_time(&self) -> bool {
+        !self.motor.latch().has(Condition::ClockFault)
+    }
+
     /// Handles a time that did not move on, so that no age is known. Feedback counts as late until the next frame, and the motor trips.
     pub(crate) fn lose_time(&mut self, now: Instant) {
         let before = self.device.begin(now);
@@ -248,8 +255,7 @@ impl Guard {
     /// Allows targets from now on, beginning without a target, if the motor is online and, after a trip, the last request
     /// [counts](Self::ask). An armed motor goes on undisturbed. While stopped, `engage` has no effect. Returns whether the motor was armed.
     pub fn engage(&mut self, now: Instant) -> bool {
-        let begins =
-            self.device.may_engage(&self.motor, now) && self.device.begin_arming(now).is_ok();
+        let begins = self.device.may_engage(&self.motor, now) && self.device.begin_arming(now);
         if begins {
             self.motor.engage(now.stamp());
         }

@@ -1,7 +1,7 @@
-//! The link to a motor, and the ages at which feedback and commands count as lost.
+//! The link to a motor, the ages at which feedback and commands count as lost, and the stamps by which ages are known.
 
 use crate::error::ConfigError;
-use crate::time::Duration;
+use crate::time::{Duration, Instant};
 
 /// Whether a motor is heard.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
@@ -187,3 +187,25 @@ const BLIND_US: u32 = 1_000_000;
 
 /// Far below the 71 minutes after which a 32-bit stamp repeats.
 const LONGEST_US: u32 = 10_000_000;
+
+/// Tells whether a stamp, of 32 bits in µs, lies within `limit` of `now`, before or after. A stamp repeats after 71 min 35 s.
+///
+/// A stamp may lie after `now`, because an interrupt may stamp a frame just after a tick has read the clock. The limit holds there too:
+/// after a set-back of the clock, an old stamp must not look fresh.
+#[inline]
+pub(crate) const fn is_near(now: u32, stamp: u32, limit: u32) -> bool {
+    now.wrapping_sub(stamp).wrapping_add(limit) <= limit.wrapping_mul(2)
+}
+
+/// Returns the age of a stamp; zero for a stamp ahead.
+pub(crate) const fn age(now: u32, stamp: u32) -> u32 {
+    let age = now.wrapping_sub(stamp);
+    if age.cast_signed() < 0 { 0 } else { age }
+}
+
+/// Returns the age of a stamp, which is brought to `now` if the clock went back behind it.
+pub(crate) fn take_age(now: Instant, stamp: &mut u32) -> Duration {
+    let micros = age(now.stamp(), *stamp);
+    *stamp = now.stamp().wrapping_sub(micros);
+    Duration::from_micros(micros.into())
+}

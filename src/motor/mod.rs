@@ -44,18 +44,20 @@ mod own;
 mod safety;
 mod watch;
 
+pub(crate) use arming::Obstacles;
 pub use arming::{ArmError, ArmingSwitch, Missing, SwitchOrder, WrongSetting};
 pub use capability::{Capabilities, Capability};
 pub use claim::{Claim, MotorName, Role};
-pub(crate) use device::Ask;
 pub use device::{CanDevice, Ingest, Malformed, Visitor};
 pub use devices::Devices;
+pub(crate) use devices::ask;
 pub use drive::{AngleDrive, Measured, OneOf, TargetError, VelocityDrive};
 pub use guard::Guard;
-pub use health::{Condition, Conditions, Health, HealthConfig, Reaction};
+pub use health::{Condition, Conditions, Health, HealthConfig, Reaction, Severity};
 pub(crate) use health::{Journal, Latch, Monitor, Rival, Sample, Traffic, elapsed};
 pub use homing::{HomingStep, ShaftState, StopHoming};
 pub use link::{Link, Timeouts};
+pub(crate) use link::{age, is_near, take_age};
 pub use load::BusLoad;
 pub(crate) use own::{
     ControlMode, Form, Goal, Preparation, Questions, Shaft, TimeoutUnits, Told, TorqueLoops,
@@ -63,8 +65,6 @@ pub(crate) use own::{
 };
 pub use own::{Impedance, ImpedanceControl, Inquiry, Order, Own, OwnMotor, Settings, Target};
 pub use safety::OPENING;
-pub(crate) use safety::{
-    Ages, DeviceGuard, Hold, LONGEST_PAUSE, MotorGuard, Rest, age, is_near, take_age,
-};
+pub(crate) use safety::{Ages, DeviceGuard, Hold, MotorGuard, Repeat, Rest};
+pub use watch::Vitals;
 pub(crate) use watch::Watch;
-pub use watch::{Severity, Vitals};

@@ -2,7 +2,7 @@
 
 use super::{
     Condition, Conditions, Guard, Health, HealthConfig, Latch, Link, Monitor, MotorName, Rival,
-    Sample, Traffic, elapsed,
+    Sample, Severity, Traffic, elapsed,
 };
 use crate::time::{Duration, Instant};
 
@@ -174,17 +174,6 @@ impl Watch {
             ..guard.health(motor)
         }
     }
-}
-
-/// Severity of an error reported by an ESC.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Severity {
-    /// The ESC continues, with a warning.
-    Warning,
-    /// The motor must not be driven.
-    Fault,
 }
 
 /// Quantities known to an own motor beside its velocity: every known quantity is monitored.

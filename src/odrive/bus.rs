@@ -1,10 +1,10 @@
 //! The motor as an own motor: its claims, its frames, and their order.
 
 use super::codec::{
-    ASK_ENDPOINT, COMMANDS, Command, ENDPOINT, ERRORS, ESTIMATES, HEARTBEAT, endpoint,
+    ASK_ENDPOINT, COMMANDS, Command, ENDPOINT, ERRORS, ESTIMATES, Endpoint, HEARTBEAT, endpoint,
     endpoint_value, id, number_of, request, words,
 };
-use super::config::Endpoint;
+use super::config::Phase;
 use super::{Endpoints, Feedback, Firmware, Heartbeat, Motor};
 use crate::control::PidConfig;
 use crate::error::ConfigError;
@@ -44,17 +44,6 @@ const PATIENCE: u8 = 51;
 /// procedure result added.
 const NOT_IDLE: u8 = 63;
 const REFUSED: u8 = 64;
-
-/// How far the drive has been enabled.
-#[derive(Debug, Default, Clone, Copy, PartialEq)]
-pub(super) enum Phase {
-    #[default]
-    Off,
-    /// The number of the first frame to the idle drive.
-    Starting(u8),
-    /// The number of the request for closed loop.
-    Requested(u8),
-}
 
 impl OwnMotor for Motor {
     fn name(&self) -> MotorName {

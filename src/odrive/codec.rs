@@ -1,6 +1,5 @@
 //! The codec of frames to a drive and from a drive.
 
-use super::config::Endpoint;
 use crate::frame::{CanFrame, standard_id};
 use crate::motor::{Form, Inquiry, lowest_bit};
 use embedded_can::{Frame, Id};
@@ -15,6 +14,9 @@ pub(super) const ASK_ENDPOINT: u8 = 0x04;
 pub(super) const ENDPOINT: u8 = 0x05;
 /// The number of the encoder estimates.
 pub(super) const ESTIMATES: u8 = 0x09;
+
+/// Number and form of an endpoint, a setting of the drive, and its place among the [names](super::Endpoints::NAMES).
+pub(super) type Endpoint = (u16, Form, u8);
 
 /// A command to a drive, in units of the motor's shaft: turns, turns/s, Nm, A.
 ///

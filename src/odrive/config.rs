@@ -1,6 +1,6 @@
 //! The user's choices: the motor, its control mode, and the endpoints of its drive; and the state of the motor.
 
-use super::bus::Phase;
+use super::codec::Endpoint;
 use super::{Feedback, Firmware, Heartbeat, Model};
 use crate::error::ConfigError;
 use crate::motor::{ControlMode, Form, ImpedanceControl, Preparation, Settings, Told};
@@ -64,6 +64,17 @@ pub(super) struct State {
     /// How often errors are still to be cleared.
     pub(super) clears: u8,
     pub(super) stops: bool,
+}
+
+/// How far the drive has been enabled.
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
+pub(super) enum Phase {
+    #[default]
+    Off,
+    /// The number of the first frame to the idle drive.
+    Starting(u8),
+    /// The number of the request for closed loop.
+    Requested(u8),
 }
 
 impl Motor {
@@ -222,9 +233,6 @@ impl Mode {
         Ok(Self { control, ..self })
     }
 }
-
-/// Number and form of an endpoint, a setting of the drive, and its place among the [names](Endpoints::NAMES).
-pub(super) type Endpoint = (u16, Form, u8);
 
 /// The endpoints to be confirmed before closed loop.
 type Preparations = [Preparation<Endpoint>; 4];

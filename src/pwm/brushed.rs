@@ -5,9 +5,10 @@ use super::rc::duty;
 use crate::control::Pid;
 use crate::error::ConfigError;
 use crate::motor::{
-    ArmError, Capabilities, Capability, Guard, Link, Missing, TargetError, VelocityDrive, Watch,
+    ArmError, Capabilities, Capability, Condition, Conditions, Guard, Health, Link, MotorName,
+    Obstacles, Repeat, TargetError, VelocityDrive, Vitals, Watch,
 };
-use crate::time::{Instant, Tick, TimeStep};
+use crate::time::{Edge, Instant, Tick, TimeStep};
 use crate::units::AngularVelocity;
 use core::f32::consts::TAU;
 use embedded_hal::pwm::SetDutyCycle;
@@ -50,6 +51,12 @@ impl<P: core::fmt::Debug, D: core::fmt::Debug> core::fmt::Display for BrushedErr
 
 impl<P: core::fmt::Debug, D: core::fmt::Debug> core::error::Error for BrushedError<P, D> {}
 
+/// Speed of a turning shaft when the no-load speed is not known, as a share of it: no stall, and never a runaway.
+const TURNS: f32 = 0.1;
+
+/// A shaft turns if it moves a count in this time.
+const COUNT_S: f32 = 0.05;
+
 /// A brushed DC motor: a PWM channel and direction pins of its bridge, and the counts of its encoder.
 ///
 /// # Examples
@@ -91,8 +98,7 @@ pub struct Brushed<P, D> {
     output: f32,
     /// The last update set a duty of its own; the loop continues from there.
     was_direct: bool,
-    /// An update without a step may set the output once more.
-    may_hold: bool,
+    may_repeat: Repeat,
     counted: Option<(u32, Instant)>,
     counts: i64,
     rad_per_s: f32,
@@ -120,7 +126,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
             way: Way::Coast,
             output: 0.0,
             was_direct: false,
-            may_hold: false,
+            may_repeat: Repeat::NO,
             counted: None,
             counts: 0,
             rad_per_s: 0.0,
@@ -156,17 +162,8 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     /// # Errors
     /// When the emergency stop is set, or no counts came.
     pub fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
-        let granted = self.guard.ask();
-        if self.guard.is_stopped() {
-            return Err(ArmError::Stopped);
-        }
         let missing = self.guard.is_missing(now).then_some(self.config.name);
-        if let Some(missing) = Missing::collect(missing.into_iter()) {
-            return Err(ArmError::Missing(missing));
-        }
-        if !granted {
-            return Err(ArmError::NotReleased);
-        }
+        Obstacles::check_one(&mut self.guard, missing)?;
         if self.guard.engage(now) {
             self.watch.start(&mut self.guard, now);
             self.rest();
@@ -257,18 +254,18 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     }
 
     fn command(&mut self, tick: Tick) -> f32 {
-        if !self.guard.drives(tick.now()) {
+        let (drives, step) = (self.guard.drives(tick.now()), TimeStep::of_motor(tick.dt_s()));
+        let may_drive = self.may_repeat.drives(drives, step.is_hold());
+        if !drives {
             // Late counts leave the integral unchanged; without a target it starts afresh.
             if !self.guard.has_target() {
                 self.rest();
             }
             return 0.0;
         }
-        let step = TimeStep::of_motor(tick.dt_s());
         if step.is_hold() {
-            return if core::mem::take(&mut self.may_hold) { self.output } else { 0.0 };
+            return if may_drive { self.output } else { 0.0 };
         }
-        self.may_hold = true;
         let is_direct = matches!(self.target, Target::Duty(_));
         let was_direct = core::mem::replace(&mut self.was_direct, is_direct);
         match (self.target, &mut self.speed) {
@@ -290,9 +287,10 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     }
 
     fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
+        self.may_repeat.end_without(self.guard.has_target());
         if !self.guard.has_target() {
             // The target before and its output are discarded.
-            (self.target, self.may_hold, self.was_direct) = (Target::Rest, false, false);
+            (self.target, self.was_direct) = (Target::Rest, false);
         }
         self.guard.admit(is_finite)
     }
@@ -330,6 +328,46 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     #[must_use]
     pub const fn guard(&self) -> &Guard {
         &self.guard
+    }
+}
+
+/// Health: conditions of the motor, and every change of a condition.
+impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
+    /// Returns the present conditions of the motor.
+    #[must_use]
+    pub const fn conditions(&self) -> Conditions {
+        self.guard.conditions()
+    }
+
+    /// Returns the health of the motor; without an encoder there is neither rate nor gap.
+    #[must_use]
+    pub fn health(&self) -> Health {
+        self.watch.health(self.config.name, &self.guard, &self.vitals())
+    }
+
+    /// Returns the oldest unread edge. No edge is lost, however late the reading; while an edge waits, the same change
+    /// is not noted again.
+    pub fn next_edge(&mut self) -> Option<Edge<Condition, MotorName>> {
+        self.guard.next_edge(self.config.name)
+    }
+
+    /// Monitors the motor, and relaxes it if configured; returns the remaining share of its limit.
+    fn check(&mut self, now: Instant) -> f32 {
+        let vitals = self.vitals();
+        self.watch.check(&mut self.guard, || vitals, now)
+    }
+
+    /// A motor without an encoder is not known to turn or to stand.
+    fn vitals(&self) -> Vitals {
+        let Some(counts_per_turn) = self.config.counts_per_turn else { return Vitals::default() };
+        let speed = match self.config.no_load {
+            Some(no_load) => self.rad_per_s / no_load.as_rad_per_s(),
+            None if self.rad_per_s.abs() > TAU / (counts_per_turn * COUNT_S) => {
+                TURNS.copysign(self.rad_per_s)
+            }
+            None => 0.0,
+        };
+        Vitals { effort: self.output / self.config.limit, speed, ..Vitals::default() }
     }
 }
 

@@ -1,7 +1,7 @@
 use crate::error::ConfigError;
 use crate::motor::{
     ArmError, Capabilities, Capability, Condition, Conditions, Guard, Health, MotorName, OPENING,
-    TargetError, Timeouts, VelocityDrive,
+    Obstacles, Repeat, TargetError, Timeouts, VelocityDrive,
 };
 use crate::time::{Duration, Edge, Instant, Tick, TimeStep};
 use crate::units::AngularVelocity;
@@ -173,7 +173,7 @@ pub struct RcPwm<P> {
     guard: Guard,
     arming: Arming,
     throttle: f32,
-    held_steps: u8,
+    may_repeat: Repeat,
 }
 
 /// Where the arming sequence is.
@@ -196,7 +196,14 @@ impl<P: SetDutyCycle> RcPwm<P> {
         config.validate()?;
         let guard =
             Guard::without_feedback().with_timeouts(config.timeouts).with_opening(config.opening);
-        Ok(Self { channel, config, guard, arming: Arming::Idle, throttle: 0.0, held_steps: 0 })
+        Ok(Self {
+            channel,
+            config,
+            guard,
+            arming: Arming::Idle,
+            throttle: 0.0,
+            may_repeat: Repeat::NO,
+        })
     }
 
     /// Begins to arm: the updates send neutral for the configured time, and targets are taken then. Without effect while
@@ -208,13 +215,7 @@ impl<P: SetDutyCycle> RcPwm<P> {
         if self.arming != Arming::Idle {
             return Ok(());
         }
-        let granted = self.guard.ask();
-        if self.guard.is_stopped() {
-            return Err(ArmError::Stopped);
-        }
-        if !granted {
-            return Err(ArmError::NotReleased);
-        }
+        Obstacles::check_one(&mut self.guard, None)?;
         if !self.guard.is_armed() {
             self.arming = Arming::Asked;
         }
@@ -249,6 +250,7 @@ impl<P: SetDutyCycle> RcPwm<P> {
     /// # Errors
     /// Names the reason of the refusal. A value that is NaN or infinite also removes the present target.
     pub fn set_throttle(&mut self, throttle: f32) -> Result<(), TargetError> {
+        self.may_repeat.end_without(self.guard.has_target());
         self.guard.admit(throttle.is_finite())?;
         self.throttle = throttle.clamp(-1.0, 1.0);
         Ok(())
@@ -260,16 +262,15 @@ impl<P: SetDutyCycle> RcPwm<P> {
     /// The error of the channel; the next call tries again.
     pub fn update(&mut self, tick: Tick) -> Result<(), P::Error> {
         let drives = self.guard.drives(tick.now());
-        if self.guard.conditions().contains(Condition::ClockFault) {
+        if !self.guard.knows_time() {
             // Nobody knows for how long neutral was sent.
             self.arming = Arming::Idle;
         }
         if self.arming != Arming::Idle {
             return self.go_on_arming(tick.now());
         }
-        let holds = TimeStep::new(tick.dt_s(), ANY_STEP_S).is_hold();
-        self.held_steps = if holds { self.held_steps.saturating_add(1) } else { 0 };
-        if drives && self.held_steps < 2 {
+        let is_hold = TimeStep::new(tick.dt_s(), ANY_STEP_S).is_hold();
+        if self.may_repeat.drives(drives, is_hold) {
             let pulse_us = self.pulse_us();
             self.send(pulse_us)
         } else if self.config.off_at_rest {

@@ -1,5 +1,6 @@
 //! The motor as an own motor: its claims, its frames, and their order.
 
+use super::config::{Enabling, Track};
 use super::model::AMPERES_PER_COUNT;
 use super::{Command, Feedback, Motor, State};
 use crate::control::PidConfig;
@@ -286,66 +287,5 @@ impl OwnMotor for Motor {
             current: current / self.model.max_current_a(),
             ..Vitals::of_errors([lowest_bit(errors.into())], 0)
         }
-    }
-}
-
-/// How far a drive is on its way to be driven.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Enabling {
-    /// The drive is to be driven.
-    pub(super) is_wanted: bool,
-    /// The state was read since then.
-    pub(super) is_sound: bool,
-    /// The brake was released, or the angle read, since then.
-    pub(super) is_prepared: bool,
-    /// All of this has been so, and nothing told otherwise since.
-    pub(super) is_on: bool,
-    /// The drive is not to be driven, and has confirmed to be off.
-    pub(super) is_off: bool,
-    /// Feedback came since then: the drive follows frames. A drive whose time-out has expired sends the first frame back, and
-    /// the second one has to be rest.
-    pub(super) is_heard: bool,
-}
-
-impl Enabling {
-    /// Takes whether the mode has to be prepared, and whether the drive has confirmed its time-out.
-    pub(super) const fn settle(&mut self, prepares: bool, has_timeout: bool) {
-        let is_prepared = self.is_prepared || !prepares;
-        self.is_on |= self.is_wanted && self.is_sound && is_prepared && has_timeout;
-    }
-}
-
-/// The angle of the output shaft between two answers, in 0.01°.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Track {
-    /// The last answer, and the angle of the feedback then, in °.
-    read: i32,
-    degrees: i16,
-    /// The way since, by the velocity.
-    way: f32,
-}
-
-impl Track {
-    pub(super) const fn new(read: i32, degrees: i16) -> Self {
-        Self { read, degrees, way: 0.0 }
-    }
-
-    /// Moves on by a way, within a degree of what feedback says.
-    pub(super) fn advance(&mut self, way: f32, degrees: i16) {
-        let moved = 100.0 * f32::from(degrees.wrapping_sub(self.degrees));
-        self.way = (self.way + way).min(moved + 100.0).max(moved - 100.0);
-    }
-
-    /// Tells whether an angle is more than half a turn away.
-    pub(super) fn is_far_from(&self, angle: i32) -> bool {
-        (i64::from(angle) - self.counts()).abs() > 18_000
-    }
-
-    pub(super) fn counts(&self) -> i64 {
-        i64::from(self.read) + i64::from(whole(self.way))
-    }
-
-    pub(super) const fn turns(&self) -> f32 {
-        (self.read as f32 + self.way) / 36_000.0
     }
 }

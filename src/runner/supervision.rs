@@ -1,7 +1,7 @@
 //! Supervision of a runner: its settings, arming, the counters and conditions, the emergency stop, and the abort of pending frames.
 
 use super::{BusCondition, Port, Runner, Statistics};
-use crate::motor::{ArmError, Ask, BusLoad, Devices};
+use crate::motor::{ArmError, BusLoad, Devices, ask};
 use crate::time::{Clock, Duration, Edge, Tick, Ticker};
 use core::sync::atomic::{AtomicBool, Ordering};
 use embedded_can::ErrorKind;
@@ -69,18 +69,13 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// Names the reason, as [`Devices::arm`]; also a watched emergency stop, and a driver that takes no frames. If motors are
     /// missing on a full bus, the error has the [measured load](Self::measured_load). A refused call counts as a request.
     pub fn arm(&mut self, tick: Tick) -> Result<(), ArmError> {
-        let refusal = if self.stop.is_some_and(EmergencyStop::is_set) {
-            ArmError::Stopped
-        } else if self.is_bus_down() {
-            ArmError::BusDown
-        } else {
-            return self.device.arm(tick.now()).map_err(|refusal| match refusal {
-                ArmError::Missing(missing) => ArmError::Missing(missing.on_bus(self.meter.last())),
-                other => other,
-            });
+        let is_stopped = self.stop.is_some_and(EmergencyStop::is_set);
+        let Some(refusal) = ArmError::around(is_stopped, self.is_bus_down()) else {
+            let outcome = self.device.arm(tick.now());
+            return outcome.map_err(|refusal| refusal.on_bus(self.meter.last()));
         };
         // A refused request is a request.
-        Ask::of(&mut self.device);
+        ask(&mut self.device);
         Err(refusal)
     }
 

@@ -1,7 +1,7 @@
-use super::model::{IDS, SLOTS, name};
-use super::schedule::{self, Answers, Budget, Counters, count, limited};
+use super::model::{Budget, Counters, IDS, SLOTS, count, limited, name};
+use super::schedule::{self, Answers};
 use super::slot::{Slot, health};
-use super::{AttachError, Command, Config, Joint, Reply, State};
+use super::{AttachError, Command, Config, Joint, Joints, Reply, State};
 use crate::frame::CanFrame;
 use crate::motor::{BusLoad, DeviceGuard, Hold, Ingest, Link, Malformed, MotorName, Timeouts};
 use crate::time::{Duration, Instant, Tick, TimeStep};
@@ -12,67 +12,6 @@ const LONGEST_REPLY: Duration = Duration::from_millis(10);
 
 /// Any time step is usable: the loops are in the drives.
 const ANY_STEP_S: f32 = f32::INFINITY;
-
-/// The joints of one CAN bus, and the frames for them.
-///
-/// Owns the joints; [`attach`](Self::attach) returns a `Copy` handle for each. The [module](super) describes the order of requests and
-/// writes. A bus can be a `static`.
-///
-/// # Examples
-/// ```
-/// use drivetrain::encoder::Position;
-/// use drivetrain::frame::CanFrame;
-/// use drivetrain::motor::Devices;
-/// use drivetrain::snake::{Config, Joints, Register, Reply};
-/// use drivetrain::time::{Instant, Tick};
-/// use drivetrain::units::Angle;
-/// use embedded_can::{Frame, StandardId};
-///
-/// let mut joints = Joints::new();
-/// let neck = joints.attach(Config::new(3))?;
-/// let at_ms = |ms: u64| Instant::from_micros(ms * 1_000);
-/// joints.update(Tick::new(at_ms(1), 0.001));
-/// let sent = |joints: &mut Joints| joints.next_frame().map(|frame| format!("{frame:?}"));
-/// assert_eq!(sent(&mut joints).as_deref(), Some("003 [6] 01 10 00 00 00 00")); // disabled
-/// assert_eq!(sent(&mut joints).as_deref(), Some("003 [2] 03 07")); // where are you?
-///
-/// let id = StandardId::new(3).ok_or("id")?;
-/// let reply = Reply::new(Register::ActualPosition, 16_384).encode();
-/// _ = joints.ingest(&CanFrame::new(id, &reply).ok_or("length")?, at_ms(2));
-/// assert_eq!(joints.state(neck).map(|state| state.position.as_turns()), Some(0.25));
-/// joints.zero(neck)?;
-/// joints.arm(at_ms(2))?;
-/// joints.set_position(neck, Position::from_angle(Angle::from_degrees(30.0)))?;
-/// joints.update(Tick::new(at_ms(2), 0.001));
-/// assert_eq!(sent(&mut joints).as_deref(), Some("003 [6] 01 0F 00 00 00 01")); // mode first, enable last
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-#[derive(Debug)]
-pub struct Joints {
-    pub(super) slots: [Slot; SLOTS],
-    pub(super) now: Instant,
-    reply_timeout: Duration,
-    pub(super) answers: Answers,
-    pub(super) budget: Budget,
-    /// Joints to be disabled before all else, to be written to, and to be polled; one bit each.
-    pub(super) stops: u16,
-    pub(super) writes: u16,
-    pub(super) reads: u16,
-    /// Requeued frames, by the same three kinds: for the next update.
-    pub(super) returned: (u16, u16, u16),
-    pub(super) reads_first: bool,
-    /// Joints last chosen for a write and a request; joints last disabled, written to and polled.
-    pub(super) last_write: u8,
-    pub(super) last_read: u8,
-    pub(super) told: u8,
-    pub(super) written: u8,
-    pub(super) asked: u8,
-    /// Rules of time and stop; each joint has a guard of its own.
-    pub(super) guard: DeviceGuard<0>,
-    /// Whether sent frames are received again.
-    pub(super) echoes: bool,
-    pub(super) counters: Counters,
-}
 
 impl Joints {
     /// Makes a bus without joints. Feedback is late after 40 ms, since each of twelve joints is polled for its position every 12 or 24 ms.

@@ -91,9 +91,7 @@ mod targets;
 #[cfg(test)]
 mod tests;
 
-pub use bus::Joints;
 pub use codec::{Command, Reply, State};
 pub use config::{AttachError, Config};
-pub use model::{IDS, PULSES_PER_TURN, Register};
-pub use schedule::Counters;
-pub use targets::Joint;
+pub use model::{Counters, IDS, Joint, PULSES_PER_TURN, Register};
+pub use schedule::Joints;

@@ -1,6 +1,6 @@
-//! Static facts of the drives.
+//! Static facts of the drives, the handle of a joint, and the rates and counters of a bus.
 
-use crate::motor::MotorName;
+use crate::motor::{BusLoad, MotorName};
 use core::f32::consts::TAU;
 
 pub use crate::wire::host_link::PULSES_PER_TURN;
@@ -107,4 +107,110 @@ pub(super) const fn name(id: u8) -> MotorName {
 pub(super) fn to_pulses(radians: f32) -> i32 {
     let pulses = radians * (PULSES_PER_TURN as f32 / TAU);
     (pulses + 0.5_f32.copysign(pulses)) as i32
+}
+
+/// Names a joint of a bus: one byte, `Copy`.
+///
+/// A handle of a detached joint finds nothing, even after another joint took its place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Joint(u8);
+
+impl Joint {
+    /// Number of joints that can follow each other in one place.
+    pub(super) const GENERATIONS: u8 = 16;
+
+    /// Index in the low half, generation in the high half.
+    pub(super) const fn new(index: u8, generation: u8) -> Self {
+        Self(generation << 4 | (index & 15))
+    }
+
+    pub(super) const fn index(self) -> usize {
+        (self.0 & 15) as usize
+    }
+
+    pub(super) const fn generation(self) -> u8 {
+        self.0 >> 4
+    }
+}
+
+/// Number of frames in an update, and the rates for the load.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Budget {
+    pub(super) reads: u8,
+    pub(super) writes: u8,
+    pub(super) bit_rate: u32,
+    pub(super) tick_hz: u32,
+}
+
+impl Budget {
+    pub(super) const fn new() -> Self {
+        Self { reads: 1, writes: 1, bit_rate: 1_000_000, tick_hz: 1_000 }
+    }
+
+    /// Returns the load of requests, replies and writes, while all joints move.
+    pub(super) const fn load(&self) -> BusLoad {
+        let Self { reads, writes, bit_rate, tick_hz } = *self;
+        BusLoad::new(bit_rate).with_frames_of(2, reads as u32, tick_hz).with_frames_of(
+            6,
+            reads as u32 + writes as u32,
+            tick_hz,
+        )
+    }
+}
+
+/// Returns a number of frames in an update, 1 to 12.
+pub(super) const fn limited(frames: u8) -> u8 {
+    match frames {
+        0 => 1,
+        1..=12 => frames,
+        _ => 12,
+    }
+}
+
+/// Counters of a bus. All saturate, except `packed` and `superseded`, which wrap at 2^32.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Counters {
+    /// Accepted replies.
+    pub replies: u32,
+    /// Frames with a joint's id and another length than 6.
+    pub bad_length: u32,
+    /// Frames with a joint's id that are no reply, or that name an unknown register.
+    pub bad_field: u32,
+    /// Frames with a joint's id that only a controller sends: there is a second controller on the bus.
+    pub foreign_commands: u32,
+    /// Frames with the id of a joint that is not attached.
+    pub unattached: u32,
+    /// Requests sent, less requests given back.
+    pub requests: u32,
+    /// Requests not answered in time, including requests given back after that.
+    pub unanswered: u32,
+    /// Updates with a time step of zero, negative, infinite or NaN, or with a time that stood still.
+    pub bad_steps: u32,
+    /// Frames that were ready: chosen by an update, or disables, whenever due; wraps.
+    pub packed: u32,
+    /// Frames replaced by newer ones before they were taken, or after they were given back; wraps.
+    pub superseded: u32,
+}
+
+impl Counters {
+    pub(super) const NONE: Self = Self {
+        replies: 0,
+        bad_length: 0,
+        bad_field: 0,
+        foreign_commands: 0,
+        unattached: 0,
+        requests: 0,
+        unanswered: 0,
+        bad_steps: 0,
+        packed: 0,
+        superseded: 0,
+    };
+}
+
+/// Counts one more; saturates.
+pub(super) const fn count(counter: &mut u32) {
+    *counter = counter.saturating_add(1);
 }

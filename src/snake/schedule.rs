@@ -1,12 +1,74 @@
-//! Order of the joints for disables, writes and requests; outstanding replies, by id, since a reply may arrive after its joint was
-//! detached; and the load of the bus.
+//! The joints of a bus, and their order for disables, writes and requests; outstanding replies, by id, since a reply may arrive after its
+//! joint was detached.
 
-use super::model::{IDS, SLOTS};
-use super::{Command, Joints, Register};
+use super::model::{Budget, Counters, IDS, SLOTS, count};
+use super::slot::Slot;
+use super::{Command, Register};
 use crate::frame::CanFrame;
-use crate::motor::BusLoad;
+use crate::motor::DeviceGuard;
 use crate::time::{Duration, Instant};
 use embedded_can::Frame;
+
+/// The joints of one CAN bus, and the frames for them.
+///
+/// Owns the joints; [`attach`](Self::attach) returns a `Copy` handle for each. The [module](super) describes the order of requests and
+/// writes. A bus can be a `static`.
+///
+/// # Examples
+/// ```
+/// use drivetrain::encoder::Position;
+/// use drivetrain::frame::CanFrame;
+/// use drivetrain::motor::Devices;
+/// use drivetrain::snake::{Config, Joints, Register, Reply};
+/// use drivetrain::time::{Instant, Tick};
+/// use drivetrain::units::Angle;
+/// use embedded_can::{Frame, StandardId};
+///
+/// let mut joints = Joints::new();
+/// let neck = joints.attach(Config::new(3))?;
+/// let at_ms = |ms: u64| Instant::from_micros(ms * 1_000);
+/// joints.update(Tick::new(at_ms(1), 0.001));
+/// let sent = |joints: &mut Joints| joints.next_frame().map(|frame| format!("{frame:?}"));
+/// assert_eq!(sent(&mut joints).as_deref(), Some("003 [6] 01 10 00 00 00 00")); // disabled
+/// assert_eq!(sent(&mut joints).as_deref(), Some("003 [2] 03 07")); // where are you?
+///
+/// let id = StandardId::new(3).ok_or("id")?;
+/// let reply = Reply::new(Register::ActualPosition, 16_384).encode();
+/// _ = joints.ingest(&CanFrame::new(id, &reply).ok_or("length")?, at_ms(2));
+/// assert_eq!(joints.state(neck).map(|state| state.position.as_turns()), Some(0.25));
+/// joints.zero(neck)?;
+/// joints.arm(at_ms(2))?;
+/// joints.set_position(neck, Position::from_angle(Angle::from_degrees(30.0)))?;
+/// joints.update(Tick::new(at_ms(2), 0.001));
+/// assert_eq!(sent(&mut joints).as_deref(), Some("003 [6] 01 0F 00 00 00 01")); // mode first, enable last
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Joints {
+    pub(super) slots: [Slot; SLOTS],
+    pub(super) now: Instant,
+    pub(super) reply_timeout: Duration,
+    pub(super) answers: Answers,
+    pub(super) budget: Budget,
+    /// Joints to be disabled before all else, to be written to, and to be polled; one bit each.
+    pub(super) stops: u16,
+    pub(super) writes: u16,
+    pub(super) reads: u16,
+    /// Requeued frames, by the same three kinds: for the next update.
+    pub(super) returned: (u16, u16, u16),
+    pub(super) reads_first: bool,
+    /// Joints last chosen for a write and a request; joints last disabled, written to and polled.
+    pub(super) last_write: u8,
+    pub(super) last_read: u8,
+    pub(super) told: u8,
+    pub(super) written: u8,
+    pub(super) asked: u8,
+    /// Rules of time and stop; each joint has a guard of its own.
+    pub(super) guard: DeviceGuard<0>,
+    /// Whether sent frames are received again.
+    pub(super) echoes: bool,
+    pub(super) counters: Counters,
+}
 
 /// Chooses the frames of this update: first pending and requeued frames, then those of the next joints in turn.
 pub(super) fn plan(joints: &mut Joints) {
@@ -262,85 +324,4 @@ impl Answers {
             })
         })
     }
-}
-
-/// Number of frames in an update, and the rates for the load.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Budget {
-    pub(super) reads: u8,
-    pub(super) writes: u8,
-    pub(super) bit_rate: u32,
-    pub(super) tick_hz: u32,
-}
-
-impl Budget {
-    pub(super) const fn new() -> Self {
-        Self { reads: 1, writes: 1, bit_rate: 1_000_000, tick_hz: 1_000 }
-    }
-
-    /// Returns the load of requests, replies and writes, while all joints move.
-    pub(super) const fn load(&self) -> BusLoad {
-        let Self { reads, writes, bit_rate, tick_hz } = *self;
-        BusLoad::new(bit_rate).with_frames_of(2, reads as u32, tick_hz).with_frames_of(
-            6,
-            reads as u32 + writes as u32,
-            tick_hz,
-        )
-    }
-}
-
-/// Returns a number of frames in an update, 1 to 12.
-pub(super) const fn limited(frames: u8) -> u8 {
-    match frames {
-        0 => 1,
-        1..=12 => frames,
-        _ => 12,
-    }
-}
-
-/// Counters of a bus. All saturate, except `packed` and `superseded`, which wrap at 2^32.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Counters {
-    /// Accepted replies.
-    pub replies: u32,
-    /// Frames with a joint's id and another length than 6.
-    pub bad_length: u32,
-    /// Frames with a joint's id that are no reply, or that name an unknown register.
-    pub bad_field: u32,
-    /// Frames with a joint's id that only a controller sends: there is a second controller on the bus.
-    pub foreign_commands: u32,
-    /// Frames with the id of a joint that is not attached.
-    pub unattached: u32,
-    /// Requests sent, less requests given back.
-    pub requests: u32,
-    /// Requests not answered in time, including requests given back after that.
-    pub unanswered: u32,
-    /// Updates with a time step of zero, negative, infinite or NaN, or with a time that stood still.
-    pub bad_steps: u32,
-    /// Frames that were ready: chosen by an update, or disables, whenever due; wraps.
-    pub packed: u32,
-    /// Frames replaced by newer ones before they were taken, or after they were given back; wraps.
-    pub superseded: u32,
-}
-
-impl Counters {
-    pub(super) const NONE: Self = Self {
-        replies: 0,
-        bad_length: 0,
-        bad_field: 0,
-        foreign_commands: 0,
-        unattached: 0,
-        requests: 0,
-        unanswered: 0,
-        bad_steps: 0,
-        packed: 0,
-        superseded: 0,
-    };
-}
-
-/// Counts one more; saturates.
-pub(super) const fn count(counter: &mut u32) {
-    *counter = counter.saturating_add(1);
 }

@@ -10,7 +10,6 @@ use crate::motor::{Condition, Guard, Link, MotorName, Rival, Timeouts, Traffic};
 use crate::time::{Duration, Instant};
 use crate::units::{Angle, AngularVelocity};
 use core::f32::consts::TAU;
-use health::Standing;
 
 /// A relaxed joint is disabled again after this time: its drive may have missed the frame.
 const KEEP_RELAXED: Duration = Duration::from_millis(100);
@@ -58,6 +57,13 @@ pub(super) struct Slot {
     rival: Rival,
     stall: Stall,
     stands: Standing,
+}
+
+/// Position of a standing joint, and the time from which the joint must move.
+#[derive(Debug, Clone, Copy)]
+struct Standing {
+    at: i32,
+    since: Instant,
 }
 
 impl Slot {
@@ -143,76 +149,11 @@ impl Slot {
         self.id.map(name)
     }
 
-    /// Takes a reply received at `now`. Every reply is kept, but only a position is a sign of life: only the position changes without the
-    /// attention of the controller.
-    pub(super) fn receive(&mut self, reply: Reply, now: Instant) {
-        match reply.register() {
-            Register::ActualPosition => self.receive_position(reply.value(), now),
-            Register::ActualSpeed => self.raw_speed = reply.value(),
-            Register::Enable if health::is_up(self) && reply.value() == 0 => {
-                self.resets = self.resets.saturating_add(1);
-                self.distrust(now);
-            }
-            _ => {}
-        }
-        if self.question == Some(reply.register()) {
-            self.question = None;
-            self.answer = Some(reply);
-        }
-    }
-
-    fn receive_position(&mut self, raw: i32, now: Instant) {
-        if let (Some(before), Link::Online | Link::Late) = (self.raw, self.guard.link()) {
-            let way = raw.wrapping_sub(before).unsigned_abs();
-            let gap_ms = now.since(self.heard).micros_u32().map_or(u32::MAX, |us| us / 1_000 + 1);
-            let furthest = gap_ms.saturating_mul(2 * FASTEST.unsigned_abs() / 1_000);
-            if way > furthest.saturating_add(JUMP.unsigned_abs()) {
-                self.position_jumps = self.position_jumps.saturating_add(1);
-                self.distrust(now);
-            }
-        }
-        health::count_position(self, now);
-        self.raw = Some(raw);
-        self.heard = now;
-        self.guard.hear(now);
-    }
-
-    /// Handles a drive in an unexpected state: its zero may differ, so the joint stays relaxed until armed again.
-    fn distrust(&mut self, now: Instant) {
-        self.guard.note(Condition::Fault, true, now);
-        self.lose_zero(now);
-        self.guard.trip();
-    }
-
-    fn lose_zero(&mut self, now: Instant) {
-        self.guard.note(Condition::PositionUncertain, true, now);
-        if self.homing == Homing::Homed {
-            self.homing = Homing::Uncertain;
-        }
-    }
-
     /// Takes targets from now on, if the joint is online. Earlier behaviour of the drive no longer counts.
     pub(super) fn engage(&mut self, now: Instant) {
         if self.guard.engage(now) {
             self.guard.note(Condition::Fault, false, now);
         }
-    }
-
-    /// Brings the joint to `now`. Returns whether the joint must be disabled.
-    pub(super) fn update(&mut self, now: Instant) -> bool {
-        let drives = self.guard.drives(now);
-        if self.guard.link() == Link::Offline {
-            self.lose_zero(now);
-        }
-        health::check(self, now);
-        // The check may have relaxed the joint.
-        let drives = drives && self.guard.is_armed();
-        let stops = self.driven && !drives;
-        if drives && !self.driven {
-            (self.pending, self.ahead) = (ALL, ALL);
-        }
-        self.driven = drives;
-        stops
     }
 
     /// Tells whether a driven joint has a changed value to write, beside periodic refreshes.

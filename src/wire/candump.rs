@@ -27,6 +27,7 @@ mod cursor;
 use embedded_can::{Frame, Id};
 
 use self::cursor::Cursor;
+pub use self::cursor::ParseError;
 use crate::frame::CanFrame;
 use crate::time::Instant;
 
@@ -76,77 +77,6 @@ impl<'a> Record<'a> {
         Ok(Self { time, interface, frame })
     }
 }
-
-/// Fault of a line of candump, and its place: the byte at which reading stopped, counted from 1.
-///
-/// # Examples
-/// ```
-/// use drivetrain::wire::candump::{ParseError, Record};
-///
-/// let error = Record::parse(b"can0 201#0E1").unwrap_err();
-/// assert_eq!(error, ParseError::DataByte(13));
-/// assert_eq!(error.to_string(), "column 13: expected two hexadecimal digits");
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum ParseError {
-    /// The line is blank.
-    Blank(usize),
-    /// There is no time stamp `(seconds.fraction)` within 64 bits of microseconds; dates (`-tA`) are not read.
-    Time(usize),
-    /// There is no name of 1 to 15 printable ASCII characters.
-    Interface(usize),
-    /// There is no id of 3 or 8 hexadecimal digits, up to `7FF` or `1FFFFFFF`.
-    Id(usize),
-    /// There is an error frame of the driver, not a data or remote frame.
-    ErrorFrame(usize),
-    /// There is a CAN FD frame, not a classic frame of up to 8 bytes.
-    CanFd(usize),
-    /// There is no length `[0]` to `[8]`, nor `#` and the data.
-    Length(usize),
-    /// There are no two hexadecimal digits.
-    DataByte(usize),
-    /// There is more than the line should have.
-    End(usize),
-}
-
-impl ParseError {
-    /// Returns the byte of the line at which reading stopped, counted from 1.
-    #[must_use]
-    pub const fn column(&self) -> usize {
-        match self {
-            Self::Blank(column)
-            | Self::Time(column)
-            | Self::Interface(column)
-            | Self::Id(column)
-            | Self::ErrorFrame(column)
-            | Self::CanFd(column)
-            | Self::Length(column)
-            | Self::DataByte(column)
-            | Self::End(column) => *column,
-        }
-    }
-}
-
-impl core::fmt::Display for ParseError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let what = match self {
-            Self::Blank(_) => "expected a frame, the line is blank",
-            Self::Time(_) => "expected a time stamp (seconds.fraction)",
-            Self::Interface(_) => "expected the name of an interface, as can0",
-            Self::Id(_) => "expected an id of 3 digits up to 7FF or 8 digits up to 1FFFFFFF",
-            Self::ErrorFrame(_) => "expected a data or remote frame, not an error frame",
-            Self::CanFd(_) => "expected a classic CAN frame, not CAN FD",
-            Self::Length(_) => "expected a length [0] to [8], or # and data",
-            Self::DataByte(_) => "expected two hexadecimal digits",
-            Self::End(_) => "expected the end of the line",
-        };
-        write!(f, "column {}: {what}", self.column())
-    }
-}
-
-impl core::error::Error for ParseError {}
 
 impl core::fmt::Display for Record<'_> {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {

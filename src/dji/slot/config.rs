@@ -2,10 +2,9 @@
 
 use super::{NO_GAINS, Slot};
 use crate::control::{Pid, PidConfig};
-use crate::dji::codec::{ErrorTable, to_raw};
+use crate::dji::codec::{ErrorTable, Range, to_raw};
 use crate::dji::config::PlainConfig;
 use crate::dji::error::SteepGain;
-use crate::dji::model::Range;
 use crate::dji::outbox::Place;
 use crate::dji::{AttachError, Facts};
 use crate::encoder::{COUNTS_PER_TURN, Homing, Shaft};

@@ -1,18 +1,18 @@
-//! Checks of one motor a tick, and its health.
+//! Checks of one motor a tick, and its state and health.
 
 use super::{Slot, coarse};
-use crate::dji::Facts;
-use crate::dji::codec::to_raw;
-use crate::dji::model::Range;
+use crate::dji::codec::{FIRST_BELOW_ZERO, Range, celsius, to_raw};
+use crate::dji::{Facts, State};
 use crate::encoder::Homing;
-use crate::motor::{Condition, Conditions, Health, HealthConfig, Link, Monitor, Sample, age};
+use crate::motor::{
+    Condition, Conditions, Health, HealthConfig, Link, Monitor, MotorName, Sample, Traffic, age,
+    elapsed,
+};
 use crate::time::Duration;
+use crate::units::Current;
 
 /// Distance inside of a soft limit from which the motor is no longer at the limit.
 const CLEAR_RAD: f32 = 0.01;
-
-/// The temperature byte that stands for -40 °C.
-const FIRST_BELOW_ZERO: u8 = 216;
 
 /// A motor with one of these conditions is not armed.
 const OBSTACLES: Conditions = Conditions::NONE.with(Condition::Fault).with(Condition::DuplicateId);
@@ -32,9 +32,62 @@ pub(in crate::dji) struct Surroundings {
     pub(in crate::dji) is_alone: bool,
 }
 
-/// Requires full checks of the motor until all is [well](waive_check) again.
-pub(super) const fn require_check(slot: &mut Slot) {
-    slot.cool_below = 0;
+/// The motor to check next, and the times of the round.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::dji) struct Rounds {
+    /// Begin of the present counting window.
+    window_from: u32,
+    /// Time of the last command frame of another node.
+    pub(in crate::dji) rival_heard: u32,
+    /// Begin of the present round.
+    begun: u32,
+    /// The rate of each motor's feedback, as configured.
+    pub(in crate::dji) feedback_hz: u32,
+    /// The length of the window that ends in this round, in units of 1.024 ms.
+    window: u16,
+    /// The length of the previous round.
+    pub(in crate::dji) elapsed: u8,
+    /// Place of the motor to check next; in a round that ends a window, beyond [`CLOSING`](Self::CLOSING).
+    pub(in crate::dji) next: u8,
+    has_begun: bool,
+    /// Whether sent frames are received again.
+    pub(in crate::dji) echoes: bool,
+}
+
+impl Rounds {
+    pub(in crate::dji) const NEW: Self = Self {
+        window_from: 0,
+        rival_heard: 0,
+        begun: 0,
+        feedback_hz: 1_000,
+        window: 0,
+        elapsed: 0,
+        next: 0,
+        has_begun: false,
+        echoes: false,
+    };
+
+    /// In a round that ends a window, each motor is checked in full: no slot has such a number, so the quick check is skipped.
+    pub(in crate::dji) const CLOSING: u8 = 0x80;
+
+    /// Returns the length of the window that ends in this round; `None` if no window ends.
+    pub(in crate::dji) const fn window(&self) -> Option<u16> {
+        if self.next & Self::CLOSING != 0 { Some(self.window) } else { None }
+    }
+
+    /// Begins a new round: one tick for each place, and one for this call.
+    pub(in crate::dji) fn begin(&mut self, now: u32) {
+        self.elapsed = elapsed(Some(now.wrapping_sub(self.begun)));
+        self.begun = now;
+        let elapsed = now.wrapping_sub(self.window_from);
+        let closes_window = self.has_begun && u64::from(elapsed) >= Traffic::WINDOW.as_micros();
+        self.next = if closes_window { Self::CLOSING } else { 0 };
+        if closes_window || !self.has_begun {
+            self.window = u16::try_from(elapsed >> 10).unwrap_or(u16::MAX);
+            self.window_from = now;
+            self.has_begun = true;
+        }
+    }
 }
 
 /// Allows quick checks from now on, if all is well.
@@ -57,7 +110,7 @@ pub(super) fn waive_check(slot: &mut Slot, facts: &Facts) {
 /// Begins a condition that a full check must end or observe.
 pub(super) const fn begin(slot: &mut Slot, condition: Condition) {
     slot.guard.latch_mut().set(condition, true);
-    require_check(slot);
+    slot.require_check();
 }
 
 /// Runs all checks that do not run in every tick.
@@ -77,25 +130,11 @@ pub(in crate::dji) fn check(slot: &mut Slot, seen: &Surroundings) {
         slot.monitor = Monitor::NEW;
     }
     if !slot.guard.latch().active().is_empty() || slot.error_code != 0 {
-        require_check(slot);
+        slot.require_check();
         react(slot, before);
     } else if slot.cool_below == 0 {
         waive_check(slot, facts);
     }
-}
-
-/// As [`check`], for a motor that is well and driven hard: cool, no condition, no error. Returns `false` if a stall, runaway or frozen
-/// feedback may begin.
-#[inline(never)]
-pub(super) fn is_driven_well(slot: &mut Slot, facts: &Facts, word: i16, elapsed: u8) -> bool {
-    let speed = f32::from(slot.feedback.rpm()) / f32::from(facts.rotor_no_load_rpm());
-    let effort = f32::from(word) / f32::from(slot.full_limit);
-    let angle = slot.feedback.angle();
-    if !slot.monitor.follow_driven(angle, coarse(word), (effort, speed), elapsed, slot.health) {
-        return false;
-    }
-    slot.saturated = slot.saturated.saturating_add(u16::from(slot.range.is_end(word)));
-    true
 }
 
 /// Takes the error code of a frame. A graver code than before counts at once: the error may be over at the motor's turn. Any other code
@@ -108,7 +147,7 @@ pub(in crate::dji) fn hear_error(slot: &mut Slot, facts: &Facts, code: u8) {
     if is_graver(slot, facts, code) {
         let before = slot.guard.latch().active();
         take_error(slot, facts, code);
-        require_check(slot);
+        slot.require_check();
         react(slot, before);
     }
 }
@@ -275,6 +314,36 @@ pub(in crate::dji) fn hear_rival(slot: &mut Slot) {
     }
 }
 
+/// Returns the state; `None` before the first frame.
+// Inline only: the compiler then drops the fields without a reader.
+#[inline(always)]
+pub(in crate::dji) fn state(slot: &Slot) -> Option<State> {
+    let facts = slot.facts?;
+    if slot.guard.link() == Link::Unheard {
+        return None;
+    }
+    let amperes =
+        slot.direction() * f32::from(slot.feedback.current()) * facts.current_full_scale_a
+            / f32::from(facts.current_raw);
+    Some(State {
+        motor: MotorName::new(facts.name, slot.id(facts)),
+        position: slot.shaft.position(),
+        homing: slot.homing,
+        velocity: slot.velocity(),
+        current: Current::from_amperes(amperes),
+        torque_nm: amperes * slot.nm_per_a,
+        temperature_c: facts.has_temperature.then_some(celsius(slot.feedback.temperature())),
+        error: facts.errors.read(slot.feedback.error()),
+        rotor_counts: slot.shaft.rotor_counts(),
+        ambiguous_gaps: slot.ambiguous_gaps,
+        refused_targets: slot.guard.refused_targets(),
+        forgotten_targets: slot.guard.forgotten_targets(),
+        conditions: slot.guard.latch().active(),
+        link: slot.guard.link(),
+        feedback: slot.feedback,
+    })
+}
+
 /// Returns the health of the motor.
 pub(in crate::dji) fn report(slot: &Slot) -> Option<Health> {
     let facts = slot.facts?;
@@ -312,11 +381,6 @@ const fn temperatures(facts: &Facts, health: &HealthConfig) -> (i16, i16) {
         Some(temperatures) => temperatures,
         None => facts.temperatures_c,
     }
-}
-
-/// Some drivers read the byte as signed, others as unsigned: -40 to -1 is more plausible than 216 to 255.
-pub(super) fn celsius(byte: u8) -> i16 {
-    if byte < FIRST_BELOW_ZERO { byte.into() } else { i16::from(byte) - 256 }
 }
 
 #[cfg(test)]

@@ -1,9 +1,8 @@
 //! Targets of a new kind, and loops outside the usual path.
 
-use super::{Goal, Slot, health, needs};
+use super::{Action, Duty, Goal, Slot};
 use crate::control::Pid;
-use crate::dji::codec::{saturate, to_raw};
-use crate::dji::model::Range;
+use crate::dji::codec::{Range, saturate, to_raw};
 use crate::dji::outbox::Outbox;
 use crate::encoder::Position;
 use crate::motor::{Link, MotorGuard, Rest, TargetError, Timeouts};
@@ -163,7 +162,7 @@ impl Slot {
         }
         let is_online = self.guard.link() == Link::Online;
         if !self.guard.latch().active().is_empty() || self.guard.is_opening() {
-            health::require_check(self);
+            self.require_check();
         }
         let is_free = self.range == Range::within(self.full_limit) && self.speed.core.is_plain();
         self.duty = match self.asked {
@@ -183,7 +182,7 @@ impl Slot {
     /// Runs loops of any kind at any limit of the output; or rests, or begins after a rest.
     #[cold]
     #[inline(never)]
-    pub(super) fn update_carefully(&mut self, dt_s: f32, sent: &Outbox) -> i16 {
+    pub(in crate::dji) fn update_carefully(&mut self, dt_s: f32, sent: &Outbox) -> i16 {
         match self.duty {
             Duty::Rest => return 0,
             Duty::First => self.end_rest(),
@@ -197,13 +196,13 @@ impl Slot {
             Action::Velocity => {
                 return self.follow_velocity(self.goal.rad_per_s(), velocity, dt_s);
             }
-            Action::Position => self.shaft.way_to(self.goal.turns(), self.goal.phase()),
-            Action::Angle => self.shaft.shortest_way_to(self.goal.phase()),
+            Action::Position => self.shaft.way_to(self.goal.turns, self.goal.value),
+            Action::Angle => self.shaft.shortest_way_to(self.goal.value),
             Action::Measured => {
                 velocity = self.goal.rate();
                 self.goal.way()
             }
-            Action::Raw => return saturate(self.goal.raw(), self.range),
+            Action::Raw => return saturate(self.goal.value, self.range),
             Action::Rest => return 0,
         };
         let step = TimeStep::of_motor(dt_s);
@@ -291,47 +290,10 @@ impl Slot {
     pub(in crate::dji) const fn speed_loop_mut(&mut self) -> &mut Pid {
         &mut self.speed
     }
-
-    pub(super) fn direction(&self) -> f32 {
-        1.0_f32.copysign(self.raw_per_unit)
-    }
 }
 
-/// Action set by the target of a motor.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub(super) enum Action {
-    Rest,
-    Raw,
-    Velocity,
-    /// By the shortest way.
-    Angle,
-    Position,
-    /// By the remaining way that another sensor measures.
-    Measured,
-}
-
-impl Action {
-    /// Tells whether the action goes to a position of the shaft.
-    pub(super) const fn is_way(self) -> bool {
-        matches!(self, Self::Angle | Self::Position)
-    }
-}
-
-/// Task of an update: the action itself in the usual, simple case.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub(super) enum Duty {
-    Rest,
-    /// The first run of any action since a rest.
-    First,
-    Raw,
-    /// The speed loop, plain and with the full output: its own limit is enough.
-    Velocity,
-    /// Both loops, as above.
-    Position,
-    /// Any other action, within the available output; also the first run of an action in place of another.
-    Other,
+fn needs(is_there: bool) -> Result<(), TargetError> {
+    if is_there { Ok(()) } else { Err(TargetError::NoLoop) }
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
 //! Every `f32` that a loop could give.
 
+use crate::dji::codec::Range;
 use crate::dji::codec::{free_to_raw, loop_to_raw};
-use crate::dji::model::{ALL_FACTS, Range};
+use crate::dji::model::ALL_FACTS;
 use crate::dji::{Config, Gm6020Voltage};
 use crate::math::tests::every_f32;
 

@@ -341,6 +341,17 @@ impl defmt::Format for Conditions {
     }
 }
 
+/// Severity of an error reported by an ESC.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Severity {
+    /// The ESC continues, with a warning.
+    Warning,
+    /// The motor must not be driven.
+    Fault,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -3,7 +3,9 @@
 use super::{INQUIRY, Impedance, Offered, Order, Own, OwnMotor, Target};
 use crate::frame::CanFrame;
 use crate::math::wrap_pi;
-use crate::motor::{CanDevice, Claim, Condition, Ingest, Link, MotorName, Role, WrongSetting};
+use crate::motor::{
+    CanDevice, Claim, Condition, Ingest, Link, MotorName, Repeat, Role, WrongSetting,
+};
 use crate::time::{Edge, Instant, Tick, TimeStep};
 use crate::units::Angle;
 use embedded_can::Frame;
@@ -30,7 +32,7 @@ impl<M: OwnMotor> CanDevice for Own<M> {
             self.withdraw();
             self.has_posted = false;
             let frame = Some(self.follow(step, left));
-            self.offered = Offered { frame, waits: true, may_repeat: true, is_rest: false };
+            self.offered = Offered { frame, waits: true, may_repeat: Repeat::ONCE, is_rest: false };
             return;
         }
         self.update_anyhow(drives, step, left, tick.now());
@@ -164,7 +166,7 @@ impl<M: OwnMotor> Own<M> {
     /// Enables, disables, asks, commands and rests, as the motor may be driven or not.
     #[inline(never)]
     fn update_anyhow(&mut self, drives: bool, step: TimeStep, left: f32, now: Instant) {
-        let may_drive = drives && (!step.is_hold() || self.offered.may_repeat);
+        let may_drive = drives && self.offered.may_repeat.admits(step.is_hold());
         // A question that is given back from now on did not enable the drive, and rest that nobody took was not sent.
         self.switched.take_if(|_| self.power.is_confirmed() && self.switching.is_none());
         self.offered.is_rest &= !self.offered.waits;
@@ -182,7 +184,7 @@ impl<M: OwnMotor> Own<M> {
         let has_other = self.has_posted || inquiry.is_some();
         let gives_way = is_at_rest && self.offered.is_rest && has_other;
         self.offer(if gives_way { inquiry } else { command });
-        self.offered.may_repeat = !is_at_rest && !step.is_hold();
+        self.offered.may_repeat = Repeat::after_update(!is_at_rest, step.is_hold());
         let is_rest = |frame: CanFrame| is_at_rest && !gives_way && !frame.is_remote();
         self.offered.is_rest = command.is_some_and(is_rest);
     }

@@ -1,11 +1,14 @@
 //! The control of a drive in impedance mode, and our own loops on torque.
 
-use super::{Impedance, Order, Shaft, Target};
+use super::{Impedance, Order, Target};
 use crate::control::{Cascade, PidConfig, limited};
 use crate::error::ConfigError;
 use crate::math::wrap_pi;
 use crate::motor::{Capabilities, Capability};
 use crate::units::{Angle, AngularVelocity};
+
+/// Angle and velocity of the output shaft; no angle if unknown.
+pub(crate) type Shaft = (Option<Angle>, AngularVelocity);
 
 /// The control of a drive that follows an [`Impedance`], as in MIT mode: any target becomes an impedance with a torque that keeps
 /// within a limit.

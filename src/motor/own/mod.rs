@@ -11,11 +11,11 @@ mod route;
 mod settings;
 
 pub use impedance::ImpedanceControl;
-pub(crate) use impedance::TorqueLoops;
+pub(crate) use impedance::{Shaft, TorqueLoops};
 pub use motor::{Impedance, Order, OwnMotor, Target};
 pub use settings::{Inquiry, Settings};
 
-pub(crate) use mode::{ControlMode, Goal, Questions, Shaft, Told, inside};
+pub(crate) use mode::{ControlMode, Goal, Questions, Told, inside};
 pub(crate) use motor::ingest_eight;
 pub(crate) use registers::{
     Form, code_from, lowest_bit, mit_model, models, register_questions, registers,
@@ -280,7 +280,7 @@ impl<M: OwnMotor> Own<M> {
             return Err(TargetError::Unsupported);
         }
         // Where there was no target, the command is of one before.
-        self.offered.may_repeat &= self.guard.has_target();
+        self.offered.may_repeat.end_without(self.guard.has_target());
         let of_drive = self.joint.target_of_drive(target);
         self.guard.admit(of_drive.unwrap_or(target).is_finite())?;
         self.target = of_drive.inspect_err(|_| self.guard.relax())?;

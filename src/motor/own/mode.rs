@@ -1,19 +1,16 @@
 //! The control mode of a drive: an impedance, or a loop of the drive's own. The frames in the place of commands: questions, and limits
 //! that a drive is told.
 
-use super::{Impedance, ImpedanceControl, Order, Target};
+use super::{Impedance, ImpedanceControl, Order, Shaft, Target};
 use crate::control::{PidConfig, limited};
 use crate::error::ConfigError;
 use crate::math::wrap_pi;
 use crate::motor::{Capabilities, Capability};
-use crate::units::{Angle, AngularVelocity};
+use crate::units::AngularVelocity;
 use crate::wire::mit::{self, Ranges};
 
 /// Each so many commands the questions begin anew: 32 ms at 1 kHz.
 const ROUND: u8 = 32;
-
-/// Angle and velocity of the output shaft; no angle if unknown.
-pub(crate) type Shaft = (Option<Angle>, AngularVelocity);
 
 /// A goal of the output shaft for one step, within the limits of the mode.
 #[derive(Debug, Clone, Copy, PartialEq)]

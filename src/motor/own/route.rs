@@ -2,7 +2,7 @@
 
 use super::{Own, OwnMotor};
 use crate::frame::CanFrame;
-use crate::motor::{CanDevice, Claim, Devices, Role, Visitor};
+use crate::motor::{CanDevice, Claim, Devices, Repeat, Role, Visitor};
 
 /// The ids of the feedback and of the commands of one motor, each as one pattern: a frame outside of both patterns is another device's.
 #[derive(Debug, Clone, Copy)]
@@ -126,14 +126,14 @@ pub(super) struct Offered {
     /// The frame is still to be taken.
     pub(super) waits: bool,
     /// A command, which an update without a step may send once more.
-    pub(super) may_repeat: bool,
+    pub(super) may_repeat: Repeat,
     /// Rest, not given back by the driver.
     pub(super) is_rest: bool,
 }
 
 impl Offered {
     pub(super) const NOTHING: Self =
-        Self { frame: None, waits: false, may_repeat: false, is_rest: false };
+        Self { frame: None, waits: false, may_repeat: Repeat::NO, is_rest: false };
 }
 
 impl<M: OwnMotor> Devices for Own<M> {

@@ -1,11 +1,11 @@
 //! Rules shared by the motors of a device: time, the request to arm, the emergency stop.
 
-use super::LONGEST_PAUSE_US;
 use super::motor::{Known, MotorGuard};
-use crate::motor::{ArmError, Journal, Link, Timeouts};
+use super::{LONGEST_PAUSE_US, Repeat};
+use crate::motor::{Journal, Link, Timeouts};
 use crate::time::{Duration, Instant};
 
-pub(crate) const LONGEST_PAUSE: Duration = Duration::from_micros(LONGEST_PAUSE_US as u64);
+const LONGEST_PAUSE: Duration = Duration::from_micros(LONGEST_PAUSE_US as u64);
 
 /// Decides whether an update may drive the motors of a device, and which motors may be armed. Keeps `N` times of edges.
 #[derive(Debug, Clone, Copy)]
@@ -69,6 +69,14 @@ impl<const N: usize> DeviceGuard<N> {
 
     pub(crate) const fn timeouts(&self) -> &Timeouts {
         &self.timeouts
+    }
+
+    /// Returns the stamp of a measurement of another sensor; `None` for a measurement too old, or too far ahead.
+    pub(crate) fn stamp_of(&self, at: Instant) -> Option<u32> {
+        // A 32-bit stamp alone would be fresh again every 71 minutes.
+        let is_ahead = self.is_running && at.since(self.updated) > LONGEST_PAUSE;
+        let is_far = is_ahead || self.updated.since(at) > self.timeouts.measured();
+        (!is_far).then(|| at.stamp())
     }
 
     /// Returns the stamp of new targets.
@@ -161,6 +169,7 @@ impl<const N: usize> DeviceGuard<N> {
         self.is_running = true;
         self.disturb();
         self.bad_steps = self.bad_steps.saturating_add(1);
+        let repeat = Repeat::after(self.held_steps);
         self.held_steps = self.held_steps.saturating_add(1);
         if !moves_on {
             // No target is left, so an update before the arming can make no target younger.
@@ -168,7 +177,7 @@ impl<const N: usize> DeviceGuard<N> {
             return Hold::LoseTime;
         }
         let is_late = self.updated.since(before) > self.timeouts.late();
-        if self.held_steps >= 2 || is_late { Hold::Rest } else { Hold::Keep }
+        if repeat.admits(true) && !is_late { Hold::Keep } else { Hold::Rest }
     }
 
     /// Returns the number of updates in a row without a usable time or step.
@@ -194,22 +203,17 @@ impl<const N: usize> DeviceGuard<N> {
         self.gesture.ask()
     }
 
-    /// Tells whether motors may be [engaged](MotorGuard::engage) at `now`. If so, ends the trip.
-    ///
-    /// # Errors
-    /// The emergency stop is set, or a request is missing.
-    pub(crate) fn begin_arming(&mut self, now: Instant) -> Result<(), ArmError> {
-        if self.is_stopped {
-            return Err(ArmError::Stopped);
-        }
-        if !self.gesture.take() {
-            return Err(ArmError::NotReleased);
+    /// Tells whether motors may be [engaged](MotorGuard::engage) at `now`: neither while the emergency stop is set, nor without a request
+    /// that counts. If so, ends the trip.
+    pub(crate) fn begin_arming(&mut self, now: Instant) -> bool {
+        if self.is_stopped || !self.gesture.take() {
+            return false;
         }
         self.now = now.stamp();
         // An arming at an earlier time changes nothing: running motors may have targets of the later one.
         self.armed_at = self.armed_at.max(now);
         self.disturb();
-        Ok(())
+        true
     }
 
     /// Tells whether a motor may be [engaged](MotorGuard::engage): online, and not armed yet. An armed motor goes on undisturbed.

@@ -6,7 +6,7 @@
 //! | question | decided by | if not |
 //! |---|---|---|
 //! | did time move on since the previous update, and is the update not before the arming? | `DeviceGuard::moves_on` | zeros in this cycle, all motors trip |
-//! | is the time step usable? | `DeviceGuard::hold` | the last commands once, then zeros |
+//! | is the time step usable? | `DeviceGuard::hold`, [`Repeat`] | the last commands once, then zeros |
 //! | is the feedback fresh? | `MotorGuard::age` | late: zero until the next feedback; offline: relaxed and latched |
 //! | is the motor armed, by a gesture? | `MotorGuard::admit`, `DeviceGuard::begin_arming` | no target is taken |
 //! | is there a target that is not expired? | `MotorGuard::age` | relaxed |
@@ -40,9 +40,9 @@
 mod device;
 mod motor;
 
-use crate::time::{Duration, Instant};
+use crate::time::Duration;
 
-pub(crate) use device::{Ages, DeviceGuard, Hold, LONGEST_PAUSE};
+pub(crate) use device::{Ages, DeviceGuard, Hold};
 pub(crate) use motor::MotorGuard;
 
 /// Default time in which the output range of a motor opens after arming: 0.2 s.
@@ -70,30 +70,47 @@ pub(crate) enum Rest {
     Relaxed,
 }
 
+/// Whether an update without a usable step may repeat the last command: the first after a command, and no other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Repeat(bool);
+
+impl Repeat {
+    /// There is no command to repeat.
+    pub(crate) const NO: Self = Self(false);
+    /// The last update gave a command.
+    pub(crate) const ONCE: Self = Self(true);
+
+    /// After so many updates in a row without a usable step.
+    const fn after(held_steps: u8) -> Self {
+        Self(held_steps == 0)
+    }
+
+    /// After an update, which drove the motor or not, with a usable step or without.
+    pub(crate) const fn after_update(drove: bool, is_hold: bool) -> Self {
+        Self(drove && !is_hold)
+    }
+
+    /// Tells whether an update may give a command: with a usable step, or once without.
+    pub(crate) const fn admits(self, is_hold: bool) -> bool {
+        !is_hold || self.0
+    }
+
+    /// Tells whether an update may drive the motor, and notes the update.
+    #[cfg(feature = "hal")]
+    pub(crate) const fn drives(&mut self, may_drive: bool, is_hold: bool) -> bool {
+        let drives = may_drive && self.admits(is_hold);
+        *self = Self::after_update(drives, is_hold);
+        drives
+    }
+
+    /// Allows no repetition if there is no target: the command is of an earlier one.
+    pub(crate) const fn end_without(&mut self, has_target: bool) {
+        self.0 &= has_target;
+    }
+}
+
 /// Longest pause between two checks for which a 32-bit stamp still represents an age.
 const LONGEST_PAUSE_US: u32 = 60_000_000;
-
-/// Tells whether a stamp, of 32 bits in µs, lies within `limit` of `now`, before or after. A stamp repeats after 71 min 35 s.
-///
-/// A stamp may lie after `now`, because an interrupt may stamp a frame just after a tick has read the clock. The limit holds there too:
-/// after a set-back of the clock, an old stamp must not look fresh.
-#[inline]
-pub(crate) const fn is_near(now: u32, stamp: u32, limit: u32) -> bool {
-    now.wrapping_sub(stamp).wrapping_add(limit) <= limit.wrapping_mul(2)
-}
-
-/// Returns the age of a stamp; zero for a stamp ahead.
-pub(crate) const fn age(now: u32, stamp: u32) -> u32 {
-    let age = now.wrapping_sub(stamp);
-    if age.cast_signed() < 0 { 0 } else { age }
-}
-
-/// Returns the age of a stamp, which is brought to `now` if the clock went back behind it.
-pub(crate) fn take_age(now: Instant, stamp: &mut u32) -> Duration {
-    let micros = age(now.stamp(), *stamp);
-    *stamp = now.stamp().wrapping_sub(micros);
-    Duration::from_micros(micros.into())
-}
 
 /// Returns whole milliseconds, at most 65 s.
 const fn whole_ms(time: Duration) -> u16 {

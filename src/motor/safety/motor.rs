@@ -1,7 +1,7 @@
 //! Rules of one motor.
 
-use super::{Arming, LONGEST_PAUSE_US, Rest, age, is_near, whole_ms};
-use crate::motor::{Condition, Latch, Link, TargetError, Timeouts};
+use super::{Arming, LONGEST_PAUSE_US, Rest, whole_ms};
+use crate::motor::{Condition, Latch, Link, TargetError, Timeouts, age, is_near};
 use crate::time::Duration;
 
 /// State of a motor before a change, for its device.

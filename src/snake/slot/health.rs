@@ -1,8 +1,10 @@
-//! Conditions of one joint.
+//! Feedback, update and conditions of one joint.
 
-use super::{LAST, Slot};
+use super::{ALL, JUMP, LAST, Slot, Standing};
+use crate::encoder::Homing;
 use crate::motor::{Condition, Health, Link, MotorName, Reaction};
-use crate::snake::PULSES_PER_TURN;
+use crate::snake::model::{FASTEST, PULSES_PER_TURN};
+use crate::snake::{Register, Reply};
 use crate::time::{Duration, Edge, Instant};
 
 /// A joint that moves less than this stands.
@@ -11,15 +13,75 @@ const STANDS: u32 = PULSES_PER_TURN.unsigned_abs() / 256;
 /// Distance to the target within which a joint has arrived.
 const THERE: u32 = PULSES_PER_TURN.unsigned_abs() / 64;
 
-/// Position of a standing joint, and the time from which the joint must move.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Standing {
-    pub(super) at: i32,
-    pub(super) since: Instant,
+impl Slot {
+    /// Takes a reply received at `now`. Every reply is kept, but only a position is a sign of life: only the position changes without the
+    /// attention of the controller.
+    pub(in crate::snake) fn receive(&mut self, reply: Reply, now: Instant) {
+        match reply.register() {
+            Register::ActualPosition => self.receive_position(reply.value(), now),
+            Register::ActualSpeed => self.raw_speed = reply.value(),
+            Register::Enable if is_up(self) && reply.value() == 0 => {
+                self.resets = self.resets.saturating_add(1);
+                self.distrust(now);
+            }
+            _ => {}
+        }
+        if self.question == Some(reply.register()) {
+            self.question = None;
+            self.answer = Some(reply);
+        }
+    }
+
+    fn receive_position(&mut self, raw: i32, now: Instant) {
+        if let (Some(before), Link::Online | Link::Late) = (self.raw, self.guard.link()) {
+            let way = raw.wrapping_sub(before).unsigned_abs();
+            let gap_ms = now.since(self.heard).micros_u32().map_or(u32::MAX, |us| us / 1_000 + 1);
+            let furthest = gap_ms.saturating_mul(2 * FASTEST.unsigned_abs() / 1_000);
+            if way > furthest.saturating_add(JUMP.unsigned_abs()) {
+                self.position_jumps = self.position_jumps.saturating_add(1);
+                self.distrust(now);
+            }
+        }
+        count_position(self, now);
+        self.raw = Some(raw);
+        self.heard = now;
+        self.guard.hear(now);
+    }
+
+    /// Handles a drive in an unexpected state: its zero may differ, so the joint stays relaxed until armed again.
+    fn distrust(&mut self, now: Instant) {
+        self.guard.note(Condition::Fault, true, now);
+        self.lose_zero(now);
+        self.guard.trip();
+    }
+
+    fn lose_zero(&mut self, now: Instant) {
+        self.guard.note(Condition::PositionUncertain, true, now);
+        if self.homing == Homing::Homed {
+            self.homing = Homing::Uncertain;
+        }
+    }
+
+    /// Brings the joint to `now`. Returns whether the joint must be disabled.
+    pub(in crate::snake) fn update(&mut self, now: Instant) -> bool {
+        let drives = self.guard.drives(now);
+        if self.guard.link() == Link::Offline {
+            self.lose_zero(now);
+        }
+        check(self, now);
+        // The check may have relaxed the joint.
+        let drives = drives && self.guard.is_armed();
+        let stops = self.driven && !drives;
+        if drives && !self.driven {
+            (self.pending, self.ahead) = (ALL, ALL);
+        }
+        self.driven = drives;
+        stops
+    }
 }
 
 /// Counts a position received at `now`, before its time replaces the previous time.
-pub(super) fn count_position(slot: &mut Slot, now: Instant) {
+fn count_position(slot: &mut Slot, now: Instant) {
     if slot.raw.is_some() {
         let gap = now.since(slot.heard).micros_u32();
         slot.traffic.gap(gap.unwrap_or(u32::MAX));
@@ -40,7 +102,7 @@ pub(in crate::snake) const fn has_rival(slot: &Slot) -> bool {
 }
 
 /// Ends expired conditions, and the window in which positions are counted.
-pub(super) fn check(slot: &mut Slot, now: Instant) {
+fn check(slot: &mut Slot, now: Instant) {
     slot.rival.check(now);
     slot.guard.note(Condition::SecondMaster, has_rival(slot), now);
     check_stall(slot, now);
@@ -69,7 +131,7 @@ fn check_stall(slot: &mut Slot, now: Instant) {
 
 /// Tells whether the joint was enabled. Before, the drive reports itself as disabled. Afterwards, there may be changed values all the time,
 /// from an application that moves the target along.
-pub(super) const fn is_up(slot: &Slot) -> bool {
+const fn is_up(slot: &Slot) -> bool {
     slot.driven && slot.pending & LAST == 0
 }
 
