@@ -58,10 +58,11 @@ pub use homing::{HomingStep, ShaftState, StopHoming};
 pub use link::{Link, Timeouts};
 pub use load::BusLoad;
 pub(crate) use own::{
-    ControlMode, Form, Goal, Preparation, Questions, Shaft, TimeoutUnits, Told, TorqueLoops,
-    code_from, ingest_eight, inside, lowest_bit, mit_model, models, register_questions, registers,
+    ControlMode, Form, Goal, Inquiry, Preparation, Questions, Settings, Shaft, TimeoutUnits, Told,
+    TorqueLoops, code_from, ingest_eight, inside, lowest_bit, mit_model, models,
+    register_questions, registers,
 };
-pub use own::{Impedance, ImpedanceControl, Inquiry, Order, Own, OwnMotor, Settings, Target};
+pub use own::{Impedance, ImpedanceControl, Order, Own, OwnMotor, Target};
 pub use safety::OPENING;
 pub(crate) use safety::{
     Ages, DeviceGuard, Hold, LONGEST_PAUSE, MotorGuard, Rest, age, is_near, take_age,

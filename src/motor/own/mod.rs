@@ -13,14 +13,13 @@ mod settings;
 pub use impedance::ImpedanceControl;
 pub(crate) use impedance::TorqueLoops;
 pub use motor::{Impedance, Order, OwnMotor, Target};
-pub use settings::{Inquiry, Settings};
 
 pub(crate) use mode::{ControlMode, Goal, Questions, Shaft, Told, inside};
 pub(crate) use motor::ingest_eight;
 pub(crate) use registers::{
     Form, code_from, lowest_bit, mit_model, models, register_questions, registers,
 };
-pub(crate) use settings::{Preparation, TimeoutUnits};
+pub(crate) use settings::{Inquiry, Preparation, Settings, TimeoutUnits};
 
 use super::{
     BusLoad, Capability, Claim, Guard, Health, HealthConfig, Ingest, Link, Role, Severity,
