@@ -68,6 +68,6 @@ pub(crate) use number::limited;
 pub use observer::LoadObserver;
 
 pub(crate) use pid::ErrorPid;
-pub use pid::{Pid, PidConfig, Terms};
+pub use pid::{Pid, PidConfig};
 pub use shaping::{FeedForward, MotionLimits, Profile, ProfileState, SlewLimiter};
 pub use tuning::{RelayTuner, StepResponse, TuningRule, WheelTuning};

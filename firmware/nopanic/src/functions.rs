@@ -183,7 +183,10 @@ fn control() {
     Pid::reset_to.call();
     Pid::set_gains.call();
     Pid::set_config.call();
-    Pid::terms.call();
+    Pid::proportional.call();
+    Pid::integral.call();
+    Pid::derivative.call();
+    Pid::feed_forward.call();
     Pid::output.call();
     Pid::config.call();
     Pid::rejected.call();
