@@ -370,7 +370,8 @@ fn losses_are_counted<'c, D: Devices + 'c>(
         let after = bench.runner.statistics();
         let offered = after.offered - before.offered;
         let refused = after.refused - before.refused;
-        let failed = after.send_errors.acknowledge - before.send_errors.acknowledge;
+        let failed = after.send_errors_of(ErrorKind::Acknowledge)
+            - before.send_errors_of(ErrorKind::Acknowledge);
         let evicted = after.evicted - before.evicted;
         let taken = after.sent - before.sent;
         assert_eq!(offered, taken + refused + failed, "{name}, {fates:?}");

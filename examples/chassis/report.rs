@@ -62,7 +62,7 @@ pub(crate) fn table(run: &Run) -> String {
         statistics.received,
         statistics.sent,
         statistics.refused,
-        statistics.send_errors.total(),
+        statistics.send_errors(),
         statistics.evicted,
         statistics.overruns
     );

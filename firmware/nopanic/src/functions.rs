@@ -17,7 +17,7 @@ use drivetrain::motor::{
     Visitor, Vitals, WrongSetting,
 };
 use drivetrain::runner::{
-    BlockingTx, EmergencyStop, ErrorCounts, FrameQueue, FrameReceiver, FrameSender, Nb, Runner,
+    BlockingTx, EmergencyStop, FrameQueue, FrameReceiver, FrameSender, Nb, Runner, Statistics,
 };
 use drivetrain::time::TimeStep;
 use drivetrain::time::{Clock, Duration, ExtendedCounter, Instant, ManualClock, Tick, Ticker};
@@ -641,7 +641,10 @@ fn runner() {
     Shell::device_mut.call();
     Shell::port_mut.call();
     (|runner: Shell| Runner::into_parts(runner).2).call();
-    ErrorCounts::total.call();
+    Statistics::receive_errors.call();
+    Statistics::receive_errors_of.call();
+    Statistics::send_errors.call();
+    Statistics::send_errors_of.call();
     EmergencyStop::new.call();
     EmergencyStop::set.call();
     EmergencyStop::clear.call();
