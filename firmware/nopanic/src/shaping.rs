@@ -171,8 +171,10 @@ fn state_space() {
     LuenbergerObserver::<6, 2, 2>::state.call();
     LuenbergerObserver::<6, 2, 2>::gain.call();
     LuenbergerObserver::<6, 2, 2>::rejected.call();
-    PlantInversion::<6, 2>::new.call();
-    PlantInversion::<6, 2>::effort.call();
-    GainSchedule::<6, 2, 4>::new.call();
-    GainSchedule::<6, 2, 4>::gain.call();
+    LinearSystem::<6, 2>::input_inverse.call();
+    (|plant: &LinearSystem<6, 2>, inverse: &_, reference: &_, next: &_| {
+        plant.effort(inverse, reference, next)
+    })
+    .call();
+    (|table: &[(f32, [[f32; 6]; 2]); 4], parameter| scheduled_gain(table, parameter)).call();
 }
