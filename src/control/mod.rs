@@ -63,7 +63,7 @@ pub use differentiator::{Differentiator, fhan};
 pub use filter::{Biquad, LowPass, Window};
 pub use identification::{Excitation, Identification, IdentificationError, Plant};
 pub(crate) use matrix::solved;
-pub use motion::{Motion, MotionFollower, MotionTarget, Motions};
+pub use motion::{Motion, MotionFollower, Motions};
 pub(crate) use number::limited;
 pub use observer::LoadObserver;
 

@@ -80,7 +80,7 @@ pub fn call_all() {
     Motion::jerk_at.call();
     Motion::duration_s.call();
     Motion::end.call();
-    MotionTarget::at_rest.call();
+    ProfileState::at_rest.call();
     Motions::<3>::plan.call();
     Motions::<3>::at.call();
     Motions::<3>::duration_s.call();
