@@ -54,7 +54,7 @@ pub use drive::{AngleDrive, Measured, OneOf, TargetError, VelocityDrive};
 pub use guard::Guard;
 pub use health::{Condition, Conditions, Health, HealthConfig, Reaction};
 pub(crate) use health::{Journal, Latch, Monitor, Rival, Sample, Traffic, elapsed};
-pub use homing::{HomingStep, ShaftState, StopHoming};
+pub use homing::{HomingStep, StopHoming};
 pub use link::{Link, Timeouts};
 pub use load::BusLoad;
 pub(crate) use own::{
