@@ -4,7 +4,7 @@ use crate::opaque::{Function, any};
 use core::hint::black_box;
 use drivetrain::control::{Differentiator, Pid, PidConfig, WheelTuning, fhan};
 use drivetrain::dji::{
-    AnyHandle, AttachError, Bus, CommandFrame, Config, Facts, Feedback, Gm6020Current,
+    AnyHandle, AttachError, Bus, Config, Facts, Feedback, Gm6020Current,
     Gm6020Voltage, Handle, M2006, M3508, Message, WordGains,
 };
 use drivetrain::encoder::{GearRatio, Homing, Position, Shaft, resolve_gap, shortest};
@@ -395,7 +395,7 @@ fn dji() {
     Feedback::current.call();
     Feedback::temperature.call();
     Feedback::error.call();
-    CommandFrame::id.call();
+    Facts::command_ids.call();
     Facts::rotor_no_load_rpm.call();
     Facts::to_word.call();
     Facts::of_word.call();
