@@ -12,7 +12,7 @@ use drivetrain::frame::CanFrame;
 use drivetrain::motor::Devices;
 use drivetrain::motor::{Ingest, Own, VelocityDrive};
 use drivetrain::runner::{BusCondition, Nb, Runner};
-use drivetrain::snake::{self, Command, Joint, Joints, Register, Reply};
+use drivetrain::snake::{self, Command, Joint, Joints, Register};
 use drivetrain::time::{Duration, Instant, ManualClock, Tick};
 use drivetrain::units::AngularVelocity;
 use embedded_can::{ErrorKind, Frame, StandardId};
@@ -558,7 +558,7 @@ impl Snake {
             if let Command::Read(register) = command {
                 let value = i32::from(register == Register::Enable);
                 let address = StandardId::new(id.into()).unwrap();
-                let reply = CanFrame::new(address, &Reply::new(register, value).encode()).unwrap();
+                let reply = CanFrame::new(address, &register.reply(value)).unwrap();
                 assert_eq!(self.joints.ingest(&reply, now), Ingest::Taken);
             }
         }

@@ -1,7 +1,7 @@
 use super::model::{IDS, SLOTS, name};
 use super::schedule::{self, Answers, Budget, Counters, count, limited};
 use super::slot::{Slot, health};
-use super::{AttachError, Command, Config, Joint, Reply, State};
+use super::{AttachError, Command, Config, Joint, Register, State};
 use crate::frame::CanFrame;
 use crate::motor::{BusLoad, DeviceGuard, Hold, Ingest, Link, Malformed, MotorName, Timeouts};
 use crate::time::{Duration, Instant, Tick, TimeStep};
@@ -23,7 +23,7 @@ const ANY_STEP_S: f32 = f32::INFINITY;
 /// use drivetrain::encoder::Position;
 /// use drivetrain::frame::CanFrame;
 /// use drivetrain::motor::Devices;
-/// use drivetrain::snake::{Config, Joints, Register, Reply};
+/// use drivetrain::snake::{Config, Joints, Register};
 /// use drivetrain::time::{Instant, Tick};
 /// use drivetrain::units::Angle;
 /// use embedded_can::{Frame, StandardId};
@@ -37,7 +37,7 @@ const ANY_STEP_S: f32 = f32::INFINITY;
 /// assert_eq!(sent(&mut joints).as_deref(), Some("003 [2] 03 07")); // where are you?
 ///
 /// let id = StandardId::new(3).ok_or("id")?;
-/// let reply = Reply::new(Register::ActualPosition, 16_384).encode();
+/// let reply = Register::ActualPosition.reply(16_384);
 /// _ = joints.ingest(&CanFrame::new(id, &reply).ok_or("length")?, at_ms(2));
 /// assert_eq!(joints.state(neck).map(|state| state.position.as_turns()), Some(0.25));
 /// joints.zero(neck)?;
@@ -191,9 +191,9 @@ impl Joints {
         let index = frame.header().wrapping_sub(1) as usize;
         let Some(slot) = self.slots.get_mut(index) else { return Ingest::Unrelated };
         let counters = &mut self.counters;
-        let reply = Reply::decode(frame.data());
-        if let Some(reply) = reply {
-            self.answers.take(index, reply.register());
+        let reply = Register::from_reply(frame.data());
+        if let Some((register, _)) = reply {
+            self.answers.take(index, register);
         }
         if slot.id.is_none() {
             count(&mut counters.unattached);

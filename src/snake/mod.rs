@@ -92,7 +92,7 @@ mod targets;
 mod tests;
 
 pub use bus::Joints;
-pub use codec::{Command, Reply, State};
+pub use codec::{Command, State};
 pub use config::{AttachError, Config};
 pub use model::{IDS, PULSES_PER_TURN, Register};
 pub use schedule::Counters;

@@ -4,7 +4,7 @@ pub(super) mod health;
 
 use super::config::{Offset, Settings, Stall};
 use super::model::{FASTEST, PULSES_PER_TURN, name, to_pulses};
-use super::{AttachError, Command, Config, Joint, Register, Reply, State};
+use super::{AttachError, Command, Config, Joint, Register, State};
 use crate::encoder::{Homing, Position};
 use crate::motor::{Condition, Guard, Link, MotorName, Rival, Timeouts, Traffic};
 use crate::time::{Duration, Instant};
@@ -47,7 +47,7 @@ pub(super) struct Slot {
     stopped: Instant,
     turn: u8,
     pub(super) question: Option<Register>,
-    pub(super) answer: Option<Reply>,
+    pub(super) answer: Option<(Register, i32)>,
     pub(super) unanswered: u32,
     pub(super) bad_replies: u32,
     position_jumps: u16,
@@ -145,19 +145,19 @@ impl Slot {
 
     /// Takes a reply received at `now`. Every reply is kept, but only a position is a sign of life: only the position changes without the
     /// attention of the controller.
-    pub(super) fn receive(&mut self, reply: Reply, now: Instant) {
-        match reply.register() {
-            Register::ActualPosition => self.receive_position(reply.value(), now),
-            Register::ActualSpeed => self.raw_speed = reply.value(),
-            Register::Enable if health::is_up(self) && reply.value() == 0 => {
+    pub(super) fn receive(&mut self, (register, value): (Register, i32), now: Instant) {
+        match register {
+            Register::ActualPosition => self.receive_position(value, now),
+            Register::ActualSpeed => self.raw_speed = value,
+            Register::Enable if health::is_up(self) && value == 0 => {
                 self.resets = self.resets.saturating_add(1);
                 self.distrust(now);
             }
             _ => {}
         }
-        if self.question == Some(reply.register()) {
+        if self.question == Some(register) {
             self.question = None;
-            self.answer = Some(reply);
+            self.answer = Some((register, value));
         }
     }
 
