@@ -308,8 +308,8 @@ fn gains_over_the_serial_port_hold_from_then_on_and_bad_ones_change_nothing() {
     assert!(worst(&soft) > 3.0 * worst(&usual), "{} {}", worst(&soft), worst(&usual));
     assert_eq!(worst(&refused).to_bits(), worst(&usual).to_bits());
     let (_, counts) = refused.serial.unwrap();
-    assert_eq!((counts.accepted, counts.out_of_range), (0, 2));
-    assert_eq!((counts.unknown, counts.malformed), (1, 1));
+    assert_eq!((counts.frames, counts.content_errors), (0, 2));
+    assert_eq!((counts.foreign_frames, counts.length_errors), (1, 1));
 }
 
 #[test]
