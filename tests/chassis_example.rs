@@ -325,5 +325,5 @@ fn a_turn_over_the_serial_port_expires_and_an_answer_tells_the_table() {
     assert!((heading(3.0) - heading(1.8)).abs() < 0.05);
     let (answers, counts) = run.serial.unwrap();
     assert!(answers.contains("2 turn=1.000 from -1.000 to 1.000 rad/s"), "{answers}");
-    assert_eq!(counts.accepted, 2);
+    assert_eq!(counts.frames, 2);
 }
