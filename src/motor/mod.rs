@@ -67,5 +67,5 @@ pub use safety::OPENING;
 pub(crate) use safety::{
     Ages, DeviceGuard, Hold, LONGEST_PAUSE, MotorGuard, Rest, age, is_near, take_age,
 };
-pub(crate) use watch::Watch;
-pub use watch::{Severity, Vitals};
+pub use watch::Vitals;
+pub(crate) use watch::{Severity, Watch};

@@ -3,7 +3,7 @@
 use drivetrain::frame::CanFrame;
 use drivetrain::math::wrap_pi;
 use drivetrain::motor::{Capabilities, Capability, Claim, Ingest, Malformed, MotorName, Order};
-use drivetrain::motor::{OwnMotor, Role, Severity, Target, Vitals};
+use drivetrain::motor::{OwnMotor, Role, Target, Vitals};
 use drivetrain::units::{Angle, AngularVelocity};
 use drivetrain::wire::mit::{self, Command, Feedback, Ranges};
 use embedded_can::{Frame, Id, StandardId};
@@ -156,7 +156,8 @@ impl OwnMotor for J4310 {
         let error_code = self.status.filter(|status| *status >= 8);
         Vitals {
             temperature_c: Some(self.temperature_c.into()),
-            error: error_code.map(|_| Severity::Fault),
+            has_fault: error_code.is_some(),
+            has_warning: false,
             error_code: error_code.unwrap_or(0),
             effort: self.effort,
             speed: self.measured.velocity_rad_per_s / RANGES.velocity_rad_per_s(),

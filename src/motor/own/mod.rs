@@ -22,8 +22,8 @@ pub(crate) use registers::{
 pub(crate) use settings::{Inquiry, Preparation, Settings, TimeoutUnits};
 
 use super::{
-    BusLoad, Capability, Claim, Guard, Health, HealthConfig, Ingest, Link, Role, Severity,
-    TargetError, Timeouts, Vitals, Watch,
+    BusLoad, Capability, Claim, Guard, Health, HealthConfig, Ingest, Link, Role, TargetError,
+    Timeouts, Vitals, Watch,
 };
 use crate::control::PidConfig;
 use crate::error::{ConfigError, finite};
@@ -370,7 +370,7 @@ impl<M: OwnMotor> Own<M> {
 
     /// Trips the motor as by a fault that the drive reports in one update.
     fn fail(&mut self, now: Instant) {
-        let vitals = Vitals { error: Some(Severity::Fault), ..self.motor.vitals() };
+        let vitals = Vitals { has_fault: true, ..self.motor.vitals() };
         _ = self.watch.check(&mut self.guard, || vitals, now);
         self.guard.relax_until_armed();
     }
