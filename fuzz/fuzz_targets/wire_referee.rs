@@ -84,8 +84,8 @@ fn message(input: &mut Input) -> Vec<u8> {
             assert_eq!(muzzle_velocity_m_s.to_bits(), speed(3).to_bits());
             assert!(!refused(speed(3)), "I2: {muzzle_velocity_m_s}");
         }
-        (Ok(RefereeMessage::Raw(raw)), _, _) => {
-            assert_eq!((raw.command(), raw.data()), (command, &data[..]));
+        (Ok(raw @ RefereeMessage::Raw { .. }), _, _) => {
+            assert_eq!(raw.as_raw(), Some((command, &data[..])));
         }
         (outcome, 0x0201, 17) => assert!(outcome.is_err() && refused(speed(12)), "{outcome:?}"),
         (outcome, 0x0207, 7) => assert!(outcome.is_err() && refused(speed(3)), "{outcome:?}"),

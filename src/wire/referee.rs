@@ -11,10 +11,10 @@
 //! | `0201` | 13 bytes, or 17 since version 2.0.0 of the protocol | [`RefereeMessage::Robot`] |
 //! | `0202` | 16 bytes, or 14 since the season of 2026 | [`RefereeMessage::Power`] |
 //! | `0207` | 7 bytes | [`RefereeMessage::Shot`] |
-//! | others, and these with another length | up to [`MAX_DATA`] bytes | [`RawMessage`] |
+//! | others, and these with another length | up to [`MAX_DATA`] bytes | [`RefereeMessage::Raw`] |
 //!
 //! The layouts change with the seasons, and no field names the version: the length alone distinguishes the layouts. Layouts of
-//! before 2024 (for example 27 bytes of `0201`) are [`RawMessage`]s.
+//! before 2024 (for example 27 bytes of `0201`) are [`RefereeMessage::Raw`].
 //!
 //! [`Referee`] reads the bytes, and returns the valid power limit and buffer energy for
 //! [`chassis::PowerBuffer`](crate::chassis::PowerBuffer):
@@ -107,9 +107,10 @@ pub(super) fn checked(frame: &[u8]) -> Result<&[u8], Reject> {
 ///     0xA5, 0x0B, 0x00, 0x01, 0x5C, 0x01, 0x00, 0xAA, 0x2C, 0x01, 0x88, 0x77, 0x66, 0x55, 0x44, 0x33, 0x22, 0x11,
 ///     0xEF, 0x74,
 /// ];
-/// let Some(RefereeMessage::Raw(status)) = decoder.read(&mut bytes) else { return Err("another message") };
-/// assert_eq!(status.command(), 0x0001); // status of the game
-/// assert_eq!(status.data()[1..3], 300_u16.to_le_bytes()); // seconds left
+/// let message = decoder.read(&mut bytes).ok_or("no message")?;
+/// let (command, data) = message.as_raw().ok_or("another message")?;
+/// assert_eq!(command, 0x0001); // status of the game
+/// assert_eq!(data[1..3], 300_u16.to_le_bytes()); // seconds left
 /// # Ok::<(), &str>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -178,47 +179,36 @@ pub enum RefereeMessage {
         /// Muzzle velocity in m/s: finite, zero or more.
         muzzle_velocity_m_s: f32,
     },
-    /// Any other; not serialized.
+    /// Any other, not serialized: see [`as_raw`](Self::as_raw).
     #[cfg_attr(feature = "serde", serde(skip))]
-    Raw(RawMessage),
+    Raw {
+        /// Number of the command.
+        command: u16,
+        /// Number of bytes of data.
+        length: u8,
+        /// The data, and zeros up to [`MAX_DATA`] bytes.
+        padded: [u8; MAX_DATA],
+    },
 }
 
-/// A message whose data is not read here.
-#[derive(Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct RawMessage {
-    command: u16,
-    length: u8,
-    data: [u8; MAX_DATA],
-}
-
-impl RawMessage {
-    fn new(command: u16, data: &[u8]) -> Option<Self> {
-        let mut message =
-            Self { command, length: u8::try_from(data.len()).ok()?, data: [0; MAX_DATA] };
-        message.data.get_mut(..data.len())?.copy_from_slice(data);
-        Some(message)
+impl RefereeMessage {
+    fn raw(command: u16, data: &[u8]) -> Option<Self> {
+        let length = u8::try_from(data.len()).ok()?;
+        let mut padded = [0; MAX_DATA];
+        padded.get_mut(..data.len())?.copy_from_slice(data);
+        Some(Self::Raw { command, length, padded })
     }
 
-    /// Returns the number of the command.
+    /// Returns the number of the command and the data, 0 to [`MAX_DATA`] bytes, of a message whose data is not read here; `None` for any
+    /// other message.
     #[must_use]
-    pub const fn command(&self) -> u16 {
-        self.command
-    }
-
-    /// Returns the data, 0 to [`MAX_DATA`] bytes.
-    #[must_use]
-    pub fn data(&self) -> &[u8] {
-        self.data.get(..usize::from(self.length)).unwrap_or(&[])
-    }
-}
-
-impl core::fmt::Debug for RawMessage {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.debug_struct("RawMessage")
-            .field("command", &self.command)
-            .field("data", &self.data())
-            .finish()
+    pub fn as_raw(&self) -> Option<(u16, &[u8])> {
+        match self {
+            Self::Raw { command, length, padded } => {
+                Some((*command, padded.get(..usize::from(*length)).unwrap_or(&[])))
+            }
+            _ => None,
+        }
     }
 }
 
@@ -248,7 +238,7 @@ impl Decode for RefereeMessage {
             (0x0201, 13 | 17) => robot_state(fields),
             (0x0202, 14 | 16) => power_heat(fields),
             (0x0207, 7) => shot(fields),
-            _ => RawMessage::new(command, data).map(Self::Raw),
+            _ => Self::raw(command, data),
         };
         message.ok_or(Reject::Content)
     }

@@ -8,7 +8,7 @@ use drivetrain::wire::hipnuc::*;
 use drivetrain::wire::host_link::*;
 use drivetrain::wire::mit;
 use drivetrain::wire::parameters::{Parameter, Parameters};
-use drivetrain::wire::referee::{self, RawMessage, Referee, RefereeMessage};
+use drivetrain::wire::referee::{self, Referee, RefereeMessage};
 use drivetrain::wire::supercap::{hkust, pacific_spirit};
 use drivetrain::wire::vofa::*;
 use drivetrain::wire::vt13::VideoRemote;
@@ -121,8 +121,7 @@ fn referee_system() {
     (|referee: &mut Referee, input: &mut &'static [u8], now| Referee::read(referee, input, now))
         .call();
     Deframer::<RefereeMessage, { referee::MAX_FRAME }>::read.call();
-    RawMessage::command.call();
-    RawMessage::data.call();
+    (|message: &RefereeMessage| message.as_raw().map(|(_, data)| data.len())).call();
     referee::encode.call();
     Deframer::<VideoRemote, 21>::with_options.call();
     Deframer::<VideoRemote, 21>::read.call();

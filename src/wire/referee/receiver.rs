@@ -111,7 +111,7 @@ impl Referee {
                 self.buffer_j.note(buffer_energy_j, MOST_BUFFER_J, now);
                 self.heat_17mm = heat_17mm;
             }
-            RefereeMessage::Shot { .. } | RefereeMessage::Raw(_) => {}
+            RefereeMessage::Shot { .. } | RefereeMessage::Raw { .. } => {}
         }
         Some(message)
     }
