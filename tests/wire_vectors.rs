@@ -2,8 +2,9 @@
 
 #![cfg(test)]
 
+use drivetrain::motor::Impedance;
 use drivetrain::time::Instant;
-use drivetrain::units::Angle;
+use drivetrain::units::{Angle, AngularVelocity};
 use drivetrain::wire::dbus::{Dbus, Keys, Switch};
 use drivetrain::wire::feetech::{self, Goal, Present, ServoId, Status, register};
 use drivetrain::wire::hipnuc::{self, Imu};
@@ -312,11 +313,11 @@ fn mit_commands() {
         let [p, v, t] = ["p", "v", "t"].map(|name| number(&limits[name]));
         let ranges = mit::Ranges::new(p, v, t).unwrap();
         let field = |name: &str| number(&input[name]);
-        let command = mit::Command {
-            position_rad: field("p"),
-            velocity_rad_per_s: field("v"),
-            kp: field("kp"),
-            kd: field("kd"),
+        let command = Impedance {
+            angle: Angle::from_radians(field("p")),
+            velocity: AngularVelocity::from_rad_per_s(field("v")),
+            stiffness: field("kp"),
+            damping: field("kd"),
             torque_nm: field("t"),
         };
         assert_eq!(ranges.encode(&command)[..], hex(&vector["expect"]["data"])[..], "{id}");
@@ -332,13 +333,16 @@ fn mit_fields() {
         let (input, expected) = (&vector["input"], vector["expect"]["u"].as_u64().unwrap());
         let (value, range) = (number(&input["x"]), number(&input["max"]));
         let ranges = |p, v| mit::Ranges::new(p, v, 1.0).unwrap();
-        let mut command = mit::Command::REST;
-        let (ranges, field) = if input["bits"] == 16 {
-            (ranges(range, 1.0), &mut command.position_rad)
+        let free = Impedance::FREE;
+        let (ranges, command) = if input["bits"] == 16 {
+            let angle = Angle::from_radians(value);
+            (ranges(range, 1.0), Impedance { angle, ..free })
         } else if input["min"] == 0 {
-            (ranges(1.0, 1.0).with_gains(range, 1.0).unwrap(), &mut command.kp)
+            let gains = ranges(1.0, 1.0).with_gains(range, 1.0).unwrap();
+            (gains, Impedance { stiffness: value, ..free })
         } else {
-            (ranges(1.0, range), &mut command.velocity_rad_per_s)
+            let velocity = AngularVelocity::from_rad_per_s(value);
+            (ranges(1.0, range), Impedance { velocity, ..free })
         };
         *field = value;
         let bits = u64::from_be_bytes(ranges.encode(&command));

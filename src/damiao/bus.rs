@@ -6,6 +6,7 @@ use super::{Feedback, Model, Register, Status};
 use crate::control::PidConfig;
 use crate::error::ConfigError;
 use crate::frame::{CanFrame, standard_id};
+use crate::motor::Impedance;
 use crate::motor::{
     Capabilities, Capability, Claim, Ingest, Inquiry, Malformed, MotorName, Order, OwnMotor,
     Preparation, Role, Settings, TimeoutUnits, Vitals, WrongSetting, register_questions,
@@ -185,7 +186,7 @@ impl OwnMotor for Motor {
 
     fn rest(&mut self) -> CanFrame {
         if self.mode.0.is_impedance() {
-            let rest = self.model.ranges().encode(&mit::Command::REST);
+            let rest = self.model.ranges().encode(&Impedance::FREE);
             CanFrame::of(standard_id(self.id.into()), rest)
         } else {
             self.off()

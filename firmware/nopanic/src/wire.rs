@@ -1,6 +1,7 @@
 //! Byte protocols.
 
 use crate::opaque::Function;
+use drivetrain::motor::Impedance;
 use drivetrain::wire::candump::*;
 use drivetrain::wire::dbus::*;
 use drivetrain::wire::feetech::*;
@@ -96,14 +97,14 @@ pub fn call_all() {
     mit::Ranges::position_rad.call();
     mit::Ranges::torque_nm.call();
     mit::Ranges::velocity_rad_per_s.call();
-    (|ranges: &mit::Ranges, command: &mit::Command| mit::Ranges::encode(ranges, command)).call();
+    (|ranges: &mit::Ranges, command: &Impedance| mit::Ranges::encode(ranges, command)).call();
     (|ranges: &mit::Ranges, data: &[u8; 8]| mit::Ranges::decode(ranges, data)).call();
     (|ranges: &mit::Ranges, data: &[u8; 5]| mit::Ranges::decode_feedback(ranges, data)).call();
     (|ranges: &mit::Ranges, feedback: &mit::Feedback| {
         mit::Ranges::encode_feedback(ranges, feedback)
     })
     .call();
-    mit::Command::torque.call();
+    Impedance::torque.call();
     referee_system();
 }
 

@@ -10,9 +10,10 @@ mod registers;
 mod route;
 mod settings;
 
+pub use crate::wire::mit::impedance::Impedance;
 pub use impedance::ImpedanceControl;
 pub(crate) use impedance::TorqueLoops;
-pub use motor::{Impedance, Order, OwnMotor, Target};
+pub use motor::{Order, OwnMotor, Target};
 
 pub(crate) use mode::{ControlMode, Goal, Questions, Shaft, Told, inside};
 pub(crate) use motor::ingest_eight;
