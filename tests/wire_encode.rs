@@ -7,7 +7,7 @@ use drivetrain::motor::Impedance;
 use drivetrain::units::{Angle, AngularVelocity};
 use drivetrain::wire::feetech::{self, Goal, Present, ServoId, Status};
 use drivetrain::wire::host_link::{
-    COMMAND_LENGTH, HostCommand, JointTarget, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
+    COMMAND_LENGTH, HostCommand, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
 };
 use drivetrain::wire::mit;
 use drivetrain::wire::vofa::{JustFloat, justfloat, text_line};
@@ -25,8 +25,8 @@ fn any_command() -> impl Strategy<Value = HostCommand> {
     let joints = any::<[(u8, i32); 12]>();
     (joints, any::<[i16; 3]>(), any::<u8>()).prop_map(|(joints, [gm6020, c610, sts3032], reset)| {
         HostCommand {
-            joints: joints
-                .map(|(speed_rpm, position_pulses)| JointTarget { speed_rpm, position_pulses }),
+            positions_pulses: joints.map(|(_, position_pulses)| position_pulses),
+            speeds_rpm: joints.map(|(speed_rpm, _)| speed_rpm),
             gm6020_position: gm6020,
             c610_position: c610,
             sts3032_degrees: sts3032,

@@ -9,7 +9,7 @@ use drivetrain::wire::dbus::{Dbus, Keys, Switch};
 use drivetrain::wire::feetech::{self, Goal, Present, ServoId, Status, register};
 use drivetrain::wire::hipnuc::{self, Imu};
 use drivetrain::wire::host_link::{
-    COMMAND_LENGTH, HostCommand, JointTarget, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
+    COMMAND_LENGTH, HostCommand, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
 };
 use drivetrain::wire::mit;
 use drivetrain::wire::{Counts, Decode, Deframer};
@@ -150,14 +150,11 @@ fn hipnuc_euler_angles_of_the_quaternion_are_those_of_the_firmware() {
 }
 
 fn command(input: &Value) -> HostCommand {
-    let speeds = integers::<u8>(&input["speeds_rpm_u8"]);
-    let positions = integers::<i32>(&input["positions_i32"]);
     let mut command = HostCommand::default();
-    for ((joint, speed_rpm), position_pulses) in
-        command.joints.iter_mut().zip(speeds).zip(positions)
-    {
-        *joint = JointTarget { speed_rpm, position_pulses };
-    }
+    let speeds = integers::<u8>(&input["speeds_rpm_u8"]);
+    command.speeds_rpm.iter_mut().zip(speeds).for_each(|(place, speed_rpm)| *place = speed_rpm);
+    let positions = integers::<i32>(&input["positions_i32"]);
+    command.positions_pulses.iter_mut().zip(positions).for_each(|(place, pulses)| *place = pulses);
     let number = |name: &str| i16::try_from(input[name].as_i64().unwrap()).unwrap();
     command.gm6020_position = number("gm6020");
     command.c610_position = number("c610");
@@ -175,9 +172,9 @@ fn host_link_commands_in_both_directions() {
         let (frames, counts) = frames::<HostCommand, COMMAND_LENGTH>((), &frame);
         assert_eq!((frames, counts.skipped_bytes), (vec![command], 0));
     }
-    let first = command(&vector("snake.cmd.ramp")["input"]).joints[0];
+    let first = command(&vector("snake.cmd.ramp")["input"]).speeds_pulses_per_s()[0];
     let expected = &vector("snake.cmd.ramp")["expect"]["speed_pulse_per_s_of_first"];
-    assert_eq!(i64::from(first.speed_pulses_per_s()), *expected);
+    assert_eq!(i64::from(first), *expected);
 }
 
 #[test]
@@ -344,7 +341,6 @@ fn mit_fields() {
             let velocity = AngularVelocity::from_rad_per_s(value);
             (ranges(1.0, range), Impedance { velocity, ..free })
         };
-        *field = value;
         let bits = u64::from_be_bytes(ranges.encode(&command));
         let sent = match (input["bits"].as_u64(), input["min"].as_f64()) {
             (Some(16), _) => bits >> 48,

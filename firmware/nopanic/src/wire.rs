@@ -73,7 +73,7 @@ pub fn call_all() {
     Present::voltage_v.call();
     Imu::euler_roll_x.call();
     Imu::euler_pitch_x.call();
-    JointTarget::speed_pulses_per_s.call();
+    HostCommand::speeds_pulses_per_s.call();
     Reset::from_raw.call();
     Reset::as_raw.call();
     HostCommand::encode.call();
