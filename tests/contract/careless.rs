@@ -7,7 +7,7 @@ use drivetrain::motor::{
     CanDevice, Capabilities, Capability, Claim, Condition, Ingest, MotorName, Role, Target,
     Visitor, WrongSetting,
 };
-use drivetrain::sim::contract::{Rule, Violation};
+use drivetrain::sim::contract::Rule;
 use drivetrain::time::{Duration, Edge, Instant, Tick};
 
 /// What a careless device gets wrong.
@@ -155,7 +155,7 @@ impl Devices for Careless {
     }
 }
 
-fn careless(mistake: Mistake) -> Result<usize, Violation> {
+fn careless(mistake: Mistake) -> Result<usize, (Rule, Duration)> {
     check_contract(|| Mixed {
         device: Careless(Own::new(MyMotor::new(3).unwrap()), mistake, None, 0.0, false),
         ids: vec![0x143],
@@ -201,7 +201,7 @@ impl Subject for Obliging {
 fn the_check_finds_a_target_that_is_taken_without_being_offered() {
     for answer in [Ok(()), Err(TargetError::Unsupported)] {
         let found = check_contract(|| Obliging(OneModel::new([1], |config| config), answer));
-        assert_eq!(found.map_err(|violation| violation.rule), Err(Rule::UnsupportedIsAnError));
+        assert_eq!(found.map_err(|(rule, _)| rule), Err(Rule::UnsupportedIsAnError));
     }
 }
 
@@ -225,7 +225,7 @@ fn the_check_finds_what_a_careless_device_gets_wrong() {
         (Mistake::KeepsNan, Rule::NanIsZero),
         (Mistake::TrustsTheStep, Rule::BadStepsAreZero),
     ] {
-        assert_eq!(careless(mistake).map_err(|violation| violation.rule), Err(rule), "{mistake:?}");
+        assert_eq!(careless(mistake).map_err(|(rule, _)| rule), Err(rule), "{mistake:?}");
     }
 }
 
@@ -378,7 +378,7 @@ fn the_check_finds_what_a_struct_of_devices_does_not_forward() {
             repeated: 0,
             now: Instant::START,
         });
-        check.map_err(|violation| violation.rule)
+        check.map_err(|(rule, _)| rule)
     };
     assert_eq!(slipping(Slip::None), Ok(RULES));
     for (slip, rule) in [
@@ -477,6 +477,6 @@ fn the_check_finds_a_loop_that_drives_at_once_or_without_a_limit() {
         (Haste::HasNoLimit, true, Err(Rule::OpensFromZero)),
     ] {
         let checked = check_contract(|| HastySubject(Own::new(Hasty(haste)), knows_effort));
-        assert_eq!(checked.map_err(|violation| violation.rule), found, "{haste:?}");
+        assert_eq!(checked.map_err(|(rule, _)| rule), found, "{haste:?}");
     }
 }

@@ -5,7 +5,7 @@ mod rules;
 
 use crate::frame::CanFrame;
 use crate::motor::{Claim, Devices, Ingest, Role, TargetError};
-use crate::time::{Instant, Tick};
+use crate::time::{Duration, Instant, Tick};
 
 /// A device under test, as needed by [`check_contract`].
 pub trait Subject {
@@ -157,24 +157,6 @@ pub enum Rule {
     IsDeterministic,
 }
 
-/// A rule that a device breaks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Violation {
-    /// The rule.
-    pub rule: Rule,
-    /// When, in milliseconds since the device was made.
-    pub at_ms: u64,
-}
-
-impl core::fmt::Display for Violation {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "{:?} is broken after {} ms", self.rule, self.at_ms)
-    }
-}
-
-impl core::error::Error for Violation {}
-
 /// Checks a device against the promises of [`Devices`]: makes fresh devices, plays their motors, and checks their
 /// frames.
 ///
@@ -207,11 +189,12 @@ impl core::error::Error for Violation {}
 /// ```
 ///
 /// # Errors
-/// The first rule that the device breaks.
-pub fn check_contract<S: Subject>(make: impl Fn() -> S) -> Result<usize, Violation> {
+/// The first rule that the device breaks, and how long after the device was made.
+pub fn check_contract<S: Subject>(make: impl Fn() -> S) -> Result<usize, (Rule, Duration)> {
     rules::check(&make)
 }
 
+type Violation = (Rule, Duration);
 type Outcome = Result<(), Violation>;
 
 /// More frames than a device may offer between two updates.
@@ -296,7 +279,7 @@ impl<S: Subject> Run<S> {
     }
 
     fn expect(&self, holds: bool, rule: Rule) -> Result<(), Violation> {
-        if holds { Ok(()) } else { Err(Violation { rule, at_ms: self.ms }) }
+        if holds { Ok(()) } else { Err((rule, Duration::from_millis(self.ms))) }
     }
 
     /// Lets a motor be heard; `false` when its frame is not taken.
