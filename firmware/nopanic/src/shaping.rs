@@ -66,8 +66,8 @@ pub fn call_all() {
     LoadObserver::velocity_rad_per_s.call();
     LoadObserver::load_nm.call();
     LoadObserver::rejected.call();
-    FeedForward::new.call();
-    FeedForward::effort.call();
+    Plant::of_gains.call();
+    Plant::effort.call();
     MotionLimits::new.call();
     MotionLimits::with_jerk.call();
     MotionLimits::validate.call();
@@ -136,7 +136,6 @@ fn identification() {
     Plant::speed_loop.call();
     Plant::bandwidth.call();
     Plant::position_loop.call();
-    Plant::feed_forward.call();
     Plant::inertia_kg_m2.call();
     Plant::friction_nm.call();
 }
