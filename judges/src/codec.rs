@@ -4,7 +4,6 @@ use crate::{Defect, Outcome};
 use drivetrain::damiao::{Command, Feedback, Model};
 use drivetrain::motor::Impedance;
 use drivetrain::units::{Angle, AngularVelocity};
-use drivetrain::wire::mit;
 use std::io::{Read, Write};
 
 /// Reads commands of five `f32`, low byte first, and writes the data of their frames. The fields are those of the mode, in their

@@ -21,7 +21,7 @@ use drivetrain::motor::Impedance;
 use drivetrain::robstride::{Command, Feedback, Model, Register};
 use drivetrain::sim::{Drive, RobStrideDrive};
 use drivetrain::units::{Angle, AngularVelocity};
-use drivetrain::wire::mit::{self, Ranges};
+use drivetrain::wire::mit::Ranges;
 use embedded_can::ExtendedId;
 use std::fmt::Write as _;
 use std::io::{BufRead, Read, Write};
