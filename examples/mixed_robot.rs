@@ -19,7 +19,7 @@ use drivetrain::motor::{
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{
     ChassisConfig, DamiaoDrive, DriveShaft, Line, MotorConfig, MotorKey, SimError, Simulation,
-    VescDrive, VescMotor, Wheel,
+    VescDrive, Wheel,
 };
 use drivetrain::time::{Duration, Edge};
 use drivetrain::units::{Angle, AngularVelocity};
@@ -104,14 +104,11 @@ struct Drives {
 impl Drives {
     fn new() -> Self {
         let pitch = DamiaoDrive::of(damiao::Model::J4310, 1);
-        let motor = VescMotor {
-            pole_pairs: 7,
-            gear: 1.0,
-            torque_constant_nm_per_a: 0.035,
-            current_max_a: 60.0,
-            no_load_rad_per_s: 600.0,
-        };
-        let shooter = VescDrive::new(23, motor).with_timeout(0.1, 0.0).with_status_hz(500.0);
+        let motor = vesc::Model { max_velocity: AngularVelocity::from_rad_per_s(600.0), ..SHOOTER };
+        let shooter = VescDrive::of(motor, 23)
+            .with_current_max(60.0)
+            .with_timeout(0.1, 0.0)
+            .with_status_hz(500.0);
         Self {
             pitch: pitch.with_shaft(DriveShaft::new(0.02, 0.02)),
             shooter: shooter.with_shaft(DriveShaft::new(0.001, 0.000_2)),

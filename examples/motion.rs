@@ -9,7 +9,7 @@
 mod output;
 mod picture;
 
-use drivetrain::control::{MotionFollower, MotionLimits, MotionTarget, Motions, ProfileState};
+use drivetrain::control::{MotionFollower, MotionLimits, Motions, ProfileState};
 use drivetrain::damiao::{Model, Motor};
 use drivetrain::math;
 use drivetrain::motor::{Devices, Impedance, ImpedanceControl, Own};
@@ -43,15 +43,19 @@ const BACK: u64 = 2_600;
 const END: u64 = 4_500;
 
 /// The target and the limits at a time.
-fn order(ms: u64) -> (MotionTarget, MotionLimits) {
+fn order(ms: u64) -> (ProfileState, MotionLimits) {
     let limits = if ms < HALVED { FAST } else { SLOW };
     let target = match ms {
-        ..FIRST => MotionTarget::at_rest(0.0),
-        FIRST..JUMP => MotionTarget::at_rest(2.0),
-        JUMP..MOVING => MotionTarget::at_rest(-0.5),
+        ..FIRST => ProfileState::at_rest(0.0),
+        FIRST..JUMP => ProfileState::at_rest(2.0),
+        JUMP..MOVING => ProfileState::at_rest(-0.5),
         // 2 rad/s, as a turret that tracks.
-        MOVING..BACK => MotionTarget { position: 2.0e-3 * (ms - MOVING) as f32, velocity: 2.0 },
-        _ => MotionTarget::at_rest(0.5),
+        MOVING..BACK => ProfileState {
+            position: 2.0e-3 * (ms - MOVING) as f32,
+            velocity: 2.0,
+            ..ProfileState::default()
+        },
+        _ => ProfileState::at_rest(0.5),
     };
     (target, limits)
 }
@@ -131,15 +135,15 @@ fn chassis() -> Result<(), Box<dyn Error>> {
     let driving = ProfileState { velocity: 1.0, ..ProfileState::default() };
     let rest = ProfileState::default();
     let quarter = core::f32::consts::FRAC_PI_2;
-    let forward = MotionTarget::at_rest(2.0);
-    let left = MotionTarget { position: 1.0, velocity: 0.5 };
+    let forward = ProfileState::at_rest(2.0);
+    let left = ProfileState { position: 1.0, velocity: 0.5, ..ProfileState::default() };
     // Angles are not wrapped: the shortest way from -3 rad to 2.5 rad leads over ±π.
     let from_angle = -3.0;
     let to_angle = from_angle + math::wrap_pi(2.5 - from_angle);
     let module = ProfileState { position: from_angle, ..rest };
     let motions = Motions::plan(
         &[driving, rest, rest, module],
-        &[forward, left, MotionTarget::at_rest(quarter), MotionTarget::at_rest(to_angle)],
+        &[forward, left, ProfileState::at_rest(quarter), ProfileState::at_rest(to_angle)],
         &[path, path, heading, steering],
     )?;
     let duration_s = motions.duration_s();

@@ -14,9 +14,7 @@ use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M2006, M3508};
 use drivetrain::motor::VelocityDrive;
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::shooter::{
-    LoaderFeedback, Shooter, ShooterConfig, ShooterFeedback, ShooterOrder, ShooterState,
-};
+use drivetrain::shooter::{Shooter, ShooterFeedback, ShooterOrder, ShooterState};
 use drivetrain::sim::{Fault, MotorConfig, MotorKey, Simulation};
 use drivetrain::time::{Duration, Instant};
 use drivetrain::units::AngularVelocity;
@@ -131,8 +129,7 @@ fn feedback(bus: &Bus, wheels: [Handle<M3508>; 2], loader: Handle<M2006>) -> Sho
     let fresh = bus.velocity(loader).and_then(|_| bus.state(loader));
     ShooterFeedback {
         wheels: wheels.map(|wheel| bus.velocity(wheel)),
-        loader: fresh
-            .map(|state| LoaderFeedback { position: state.position, velocity: state.velocity }),
+        loader: fresh.map(|state| (state.position, state.velocity)),
         ..ShooterFeedback::default()
     }
 }
@@ -160,7 +157,7 @@ fn shoot() -> Result<(Vec<Sample>, f32), Box<dyn Error>> {
     let wheels = [bus.attach(wheel(1))?, bus.attach(wheel(2).reversed())?];
     let loader = bus.attach(Config::<M2006>::new(3).speed_loop(LOADER_SPEED))?;
     let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
-    let mut shooter = Shooter::new(ShooterConfig::new(WHEELS, CHAMBERS, SHOTS_PER_S))?;
+    let mut shooter = Shooter::new(WHEELS, CHAMBERS, SHOTS_PER_S)?;
     let mut referee = Referee::new(45);
     let (mut samples, mut before) = (Vec::new(), shooter.state());
     while world.now() < at(END_S) {
@@ -182,11 +179,11 @@ fn shoot() -> Result<(Vec<Sample>, f32), Box<dyn Error>> {
             heat: referee.heat_17mm(now),
             ..feedback(bus, wheels, loader)
         };
-        let targets = shooter.update(order(time_s), &feedback, tick);
+        let (wheel_speed, loader_speed) = shooter.update(order(time_s), &feedback, tick);
         for wheel in wheels {
-            _ = bus.set_velocity(wheel, targets.wheels);
+            _ = bus.set_velocity(wheel, wheel_speed);
         }
-        _ = bus.set_velocity(loader, targets.loader);
+        _ = bus.set_velocity(loader, loader_speed);
         runner.tick(tick);
 
         if shooter.state() != before && shooter.state() == ShooterState::Clearing {

@@ -462,7 +462,7 @@ fn what_needs_arithmetic_and_comparison_only_is_made_in_a_constant() {
         Biquad::notch(60.0, 2.0, 1000.0).is_ok(),
         Window::<5>::new().rejected() == 0,
         SlewLimiter::new(1.0, 2.0).is_ok() && MotionLimits::new(1.0, 1.0).validate().is_ok(),
-        FeedForward::new(0.3, 0.05, 0.01).is_ok(),
+        Plant::of_gains(0.3, 0.05, 0.01).is_ok(),
         RelayTuner::new(3.0, 0.01).is_ok(),
         StepResponse::new(0.0, 1.0, 1.0, 0.02).is_ok(),
     ];
@@ -475,7 +475,7 @@ fn the_table_of_the_module_says_when_to_use_each_type() {
     let rows: String = source.lines().filter(|line| line.starts_with("//! |")).collect();
     let public = source.split("pub use ").skip(1).filter_map(|rest| rest.split(';').next());
     let names = public.flat_map(|uses| uses.split(|letter: char| !letter.is_alphanumeric()));
-    let parts = ["Terms", "TimeStep", "MotionLimits", "MotionTarget", "ProfileState"];
+    let parts = ["TimeStep", "MotionLimits", "ProfileState"];
     let mut seen = 0;
     for name in names.filter(|name| name.starts_with(char::is_uppercase)) {
         let is_part = ["Config", "Error", "Fault", "Failure"].iter().any(|end| name.ends_with(end));
@@ -484,7 +484,7 @@ fn the_table_of_the_module_says_when_to_use_each_type() {
             seen += 1;
         }
     }
-    assert_eq!(seen, 22);
+    assert_eq!(seen, 21);
 }
 
 #[test]
@@ -546,7 +546,7 @@ fn the_integral_of_the_angle_loop_works_at_every_divider() {
 
 #[test]
 fn what_has_no_state_answers_bad_arguments_with_rest() {
-    let effort = FeedForward::new(0.3, 0.05, 0.01).unwrap();
+    let effort = Plant::of_gains(0.3, 0.05, 0.01).unwrap();
     let profile = Profile::plan(1.0, 2.0, &MotionLimits::new(1.0, 1.0)).unwrap();
     for bad in NOT_FINITE {
         assert_eq!((effort.effort(bad, 1.0), effort.effort(1.0, bad)), (0.0, 0.0));
@@ -611,9 +611,9 @@ const ZERO_OR_MORE: Parameters = &[
     ("dead_band", |x| Pid::new(GAINS.with_dead_band(x)).err()),
     ("static_gain", |x| Pid::new(GAINS.with_feed_forward(x, 0.0)).err()),
     ("velocity_gain", |x| Pid::new(GAINS.with_feed_forward(0.0, x)).err()),
-    ("ks", |x| FeedForward::new(x, 0.0, 0.0).err()),
-    ("kv", |x| FeedForward::new(0.0, x, 0.0).err()),
-    ("ka", |x| FeedForward::new(0.0, 0.0, x).err()),
+    ("ks", |x| Plant::of_gains(x, 0.0, 0.0).err()),
+    ("kv", |x| Plant::of_gains(0.0, x, 0.0).err()),
+    ("ka", |x| Plant::of_gains(0.0, 0.0, x).err()),
     ("hysteresis", |x| RelayTuner::new(1.0, x).err()),
 ];
 

@@ -73,7 +73,7 @@ impl<M: Model, const N: usize> Words<M, N> {
         self.bus.update(Tick::new(at_us(self.now_us), 1e-6));
         let mut words = [0; 8];
         while let Some(frame) = self.bus.next_frame() {
-            let high = frame.header() != u32::from(M::FACTS.command[0].id());
+            let high = frame.header() != u32::from(M::FACTS.command_ids()[0]);
             for (slot, word) in frame.bytes().chunks_exact(2).enumerate() {
                 words[slot + 4 * usize::from(high)] = i16::from_be_bytes([word[0], word[1]]);
             }

@@ -109,8 +109,7 @@ fn named(line: &str) -> Vec<String> {
 }
 
 /// Names of the driver that the simulator may use: the table of facts, not the code.
-const FACTS: [&str; 11] = [
-    "CommandFrame",
+const FACTS: [&str; 10] = [
     "Facts",
     "Gm6020Current",
     "Gm6020Voltage",

@@ -5,7 +5,7 @@
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M2006};
 use drivetrain::encoder::Position;
-use drivetrain::motor::{Devices, HomingStep, Link, ShaftState, StopHoming};
+use drivetrain::motor::{Devices, HomingStep, Link, StopHoming};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{Fault, MotorConfig, MotorKey, Simulation};
 use drivetrain::time::{Duration, Instant};
@@ -26,13 +26,9 @@ fn config(rpm: f32) -> StopHoming {
     homing.and_then(|homing| homing.with_travel(degrees(200.0))).unwrap()
 }
 
-fn shaft(bus: &Bus, motor: Handle<M2006>) -> Option<ShaftState> {
+fn shaft(bus: &Bus, motor: Handle<M2006>) -> Option<(Position, AngularVelocity, f32)> {
     let state = bus.state(motor).filter(|state| state.link == Link::Online)?;
-    Some(ShaftState {
-        position: state.position,
-        velocity: state.velocity,
-        effort: state.current.as_amperes(),
-    })
+    Some((state.position, state.velocity, state.current.as_amperes()))
 }
 
 #[derive(Debug)]

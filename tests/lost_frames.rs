@@ -12,7 +12,7 @@ use drivetrain::frame::CanFrame;
 use drivetrain::motor::Devices;
 use drivetrain::motor::{Ingest, Own, VelocityDrive};
 use drivetrain::runner::{BusCondition, Nb, Runner};
-use drivetrain::snake::{self, Command, Joint, Joints, Register, Reply};
+use drivetrain::snake::{self, Command, Joint, Joints, Register};
 use drivetrain::time::{Duration, Instant, ManualClock, Tick};
 use drivetrain::units::AngularVelocity;
 use embedded_can::{ErrorKind, Frame, StandardId};
@@ -370,7 +370,8 @@ fn losses_are_counted<'c, D: Devices + 'c>(
         let after = bench.runner.statistics();
         let offered = after.offered - before.offered;
         let refused = after.refused - before.refused;
-        let failed = after.send_errors.acknowledge - before.send_errors.acknowledge;
+        let failed = after.send_errors_of(ErrorKind::Acknowledge)
+            - before.send_errors_of(ErrorKind::Acknowledge);
         let evicted = after.evicted - before.evicted;
         let taken = after.sent - before.sent;
         assert_eq!(offered, taken + refused + failed, "{name}, {fates:?}");
@@ -557,7 +558,7 @@ impl Snake {
             if let Command::Read(register) = command {
                 let value = i32::from(register == Register::Enable);
                 let address = StandardId::new(id.into()).unwrap();
-                let reply = CanFrame::new(address, &Reply::new(register, value).encode()).unwrap();
+                let reply = CanFrame::new(address, &register.reply(value)).unwrap();
                 assert_eq!(self.joints.ingest(&reply, now), Ingest::Taken);
             }
         }

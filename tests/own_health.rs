@@ -5,7 +5,7 @@
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
     ArmError, Claim, Condition, Devices, HealthConfig, Ingest, Malformed, MotorName, Order, Own,
-    OwnMotor, Reaction, Role, Severity, TargetError, VelocityDrive, Vitals,
+    OwnMotor, Reaction, Role, TargetError, VelocityDrive, Vitals,
 };
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::AngularVelocity;
@@ -41,11 +41,8 @@ impl OwnMotor for Talker {
         };
         self.vitals = Vitals {
             temperature_c: Some(celsius.into()),
-            error: match code {
-                0 => None,
-                1..10 => Some(Severity::Warning),
-                _ => Some(Severity::Fault),
-            },
+            has_fault: code >= 10,
+            has_warning: (1..10).contains(&code),
             error_code: code,
             effort: f32::from(effort.cast_signed()) / 100.0,
             speed: f32::from(speed.cast_signed()) / 100.0,

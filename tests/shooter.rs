@@ -5,10 +5,7 @@
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M2006, M3508};
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::shooter::{
-    LoaderFeedback, Shooter, ShooterConfig, ShooterFault, ShooterFeedback, ShooterOrder,
-    ShooterState, ShooterTargets,
-};
+use drivetrain::shooter::{Shooter, ShooterFeedback, ShooterOrder, ShooterState};
 use drivetrain::sim::{Controller, Fault, Line, MotorConfig, MotorKey, Simulation};
 use drivetrain::time::{Duration, Instant};
 use drivetrain::units::AngularVelocity;
@@ -46,8 +43,11 @@ struct Range<'w> {
     ms: u64,
     /// Of the loader's encoder.
     start: i64,
-    targets: ShooterTargets,
+    targets: (AngularVelocity, AngularVelocity),
 }
+
+/// The targets of motors that stand.
+const REST: (AngularVelocity, AngularVelocity) = (AngularVelocity::ZERO, AngularVelocity::ZERO);
 
 fn at_ms(ms: u64) -> Instant {
     Instant::from_micros(1_000 * ms)
@@ -55,11 +55,11 @@ fn at_ms(ms: u64) -> Instant {
 
 impl<'w> Range<'w> {
     fn new(world: &'w Simulation, barrel: Option<Barrel>) -> Self {
-        let config = ShooterConfig::new(AngularVelocity::from_rpm(WHEEL_RPM), CHAMBERS, 10.0);
-        Self::with(world, barrel, config)
+        let shooter = Shooter::new(AngularVelocity::from_rpm(WHEEL_RPM), CHAMBERS, 10.0);
+        Self::with(world, barrel, shooter.unwrap())
     }
 
-    fn with(world: &'w Simulation, barrel: Option<Barrel>, config: ShooterConfig) -> Self {
+    fn with(world: &'w Simulation, barrel: Option<Barrel>, shooter: Shooter) -> Self {
         let wheel = |id| world.attach(MotorConfig::m3508(id)).unwrap();
         let loader = MotorConfig::m2006(3).with_load_friction_nm(0.1);
         let keys = [wheel(1), wheel(2), world.attach(loader).unwrap()];
@@ -75,7 +75,7 @@ impl<'w> Range<'w> {
             wheels,
             loader,
             keys,
-            shooter: Shooter::new(config).unwrap(),
+            shooter,
             referee: Referee::new(45),
             barrel,
             heat: 0.0,
@@ -86,7 +86,7 @@ impl<'w> Range<'w> {
             brake_until_ms: 0,
             ms: 0,
             start: world.motor(keys[2]).unwrap().encoder_counts,
-            targets: ShooterTargets::REST,
+            targets: REST,
         }
     }
 
@@ -162,17 +162,14 @@ impl<'w> Range<'w> {
             let feedback = ShooterFeedback {
                 is_armed,
                 wheels: self.wheels.map(|wheel| bus.velocity(wheel)),
-                loader: loader.map(|state| LoaderFeedback {
-                    position: state.position,
-                    velocity: state.velocity,
-                }),
+                loader: loader.map(|state| (state.position, state.velocity)),
                 heat: self.referee.heat_17mm(at_ms(self.ms)),
             };
             self.targets = self.shooter.update(order, &feedback, tick);
             for wheel in self.wheels {
-                _ = bus.set_velocity(wheel, self.targets.wheels);
+                _ = bus.set_velocity(wheel, self.targets.0);
             }
-            _ = bus.set_velocity(self.loader, self.targets.loader);
+            _ = bus.set_velocity(self.loader, self.targets.1);
             self.runner.tick(tick);
             if self.shooter.state() == ShooterState::Ready {
                 self.off_when_ready = self.off_when_ready.max(self.deviation());
@@ -231,12 +228,12 @@ fn a_jam_that_gives_way_is_cleared_and_one_that_does_not_stops_the_shooter() {
     world.fault(Fault::BlockedShaft(range.keys[2]), at_ms(range.ms)..).unwrap();
     range.run(ShooterOrder::Spin, 20, true);
     range.run(ShooterOrder::Fire(3), 2_000, true);
-    assert_eq!(range.shooter.state(), ShooterState::Fault(ShooterFault::Jammed));
-    assert_eq!((range.targets, range.balls), (ShooterTargets::REST, 3));
+    assert_eq!(range.shooter.state(), ShooterState::Jammed);
+    assert_eq!((range.targets, range.balls), (REST, 3));
     // Neither a new trigger nor a spin clears it: rest does.
     range.run(ShooterOrder::Spin, 50, true);
     range.run(ShooterOrder::Fire(1), 50, true);
-    assert_eq!(range.shooter.state(), ShooterState::Fault(ShooterFault::Jammed));
+    assert_eq!(range.shooter.state(), ShooterState::Jammed);
     range.run(ShooterOrder::Rest, 5, true);
     assert_eq!(range.shooter.state(), ShooterState::Rest);
 }
@@ -272,16 +269,16 @@ fn a_wheel_that_is_lost_stops_wheels_and_loader_and_comes_back_only_after_rest()
         let (from, until) = (range.ms + 250, range.ms + 330);
         world.fault(Fault::Silent(lost), at_ms(from)..at_ms(until)).unwrap();
         range.run(ShooterOrder::Fire(50), 300, true);
-        let fault = if fault_of_wheel { ShooterFault::WheelLost } else { ShooterFault::LoaderLost };
-        assert_eq!(range.shooter.state(), ShooterState::Fault(fault));
-        assert_eq!(range.targets, ShooterTargets::REST);
+        let fault = if fault_of_wheel { ShooterState::WheelLost } else { ShooterState::LoaderLost };
+        assert_eq!(range.shooter.state(), fault);
+        assert_eq!(range.targets, REST);
         // A loader that is silent is not braked: it coasts, and a ball may drop.
         let balls = range.balls;
         range.run(ShooterOrder::Fire(50), 100, true);
         assert!(range.balls <= balls + 1);
         let balls = range.balls;
         range.run(ShooterOrder::Fire(50), 1_000, true); // it is heard again since long
-        assert_eq!((range.balls, range.targets), (balls, ShooterTargets::REST));
+        assert_eq!((range.balls, range.targets), (balls, REST));
         assert!(range.wheels_rpm().iter().all(|rpm| *rpm < 40.0) && range.loader_rpm() == 0.0);
         range.run(ShooterOrder::Rest, 100, true);
         range.run(ShooterOrder::Spin, 2_000, true);
@@ -309,7 +306,7 @@ fn disarmed_everything_is_at_rest_and_a_held_trigger_shoots_nothing_when_armed_a
     let balls = range.balls;
     assert!(balls > 0);
     range.run(ShooterOrder::Fire(50), 200, false);
-    assert_eq!((range.shooter.state(), range.targets), (ShooterState::Rest, ShooterTargets::REST));
+    assert_eq!((range.shooter.state(), range.targets), (ShooterState::Rest, REST));
     assert!(range.balls <= balls + 1, "the loader stops by its friction");
     let balls = range.balls;
     let commands = world.traffic(Line::Can1);
@@ -329,16 +326,17 @@ fn a_wheel_that_does_not_reach_its_speed_is_a_fault_after_3_s() {
     range.run(ShooterOrder::Fire(1), 2_900, true);
     assert_eq!((range.shooter.state(), range.balls), (ShooterState::SpinningUp, 0));
     range.run(ShooterOrder::Fire(1), 400, true);
-    assert_eq!(range.shooter.state(), ShooterState::Fault(ShooterFault::WheelSlow));
+    assert_eq!(range.shooter.state(), ShooterState::WheelSlow);
 }
 
 #[test]
 fn for_practice_a_heat_limit_without_the_referee_system_holds() {
     use drivetrain::wire::referee::BarrelHeat;
     let world = Simulation::new(9);
-    let config = ShooterConfig::new(AngularVelocity::from_rpm(WHEEL_RPM), CHAMBERS, 10.0)
+    let shooter = Shooter::new(AngularVelocity::from_rpm(WHEEL_RPM), CHAMBERS, 10.0)
+        .unwrap()
         .with_heat_without_referee(BarrelHeat { heat: 0, limit: 50, cooling_per_s: 10 });
-    let mut range = Range::with(&world, None, config);
+    let mut range = Range::with(&world, None, shooter);
     range.run(ShooterOrder::Spin, 1_500, true);
     range.run(ShooterOrder::Fire(255), 3_000, true);
     // 4 at once, then 1 in 1 s.

@@ -8,7 +8,7 @@ mod system;
 
 use drivetrain::frame::CanFrame;
 use drivetrain::sim::{Sender, Transmission};
-use drivetrain::snake::{Command, Register, Reply};
+use drivetrain::snake::{Command, Register};
 use embedded_can::Frame;
 use std::net::TcpListener;
 use std::time::Duration;
@@ -141,8 +141,8 @@ fn nothing_is_sent_to_a_joint_that_owes_an_answer() {
                 asked += 1;
             }
         } else {
-            let reply = Reply::decode(record.frame.data()).unwrap();
-            assert_eq!(owed.take(), Some(reply.register()));
+            let (register, _) = Register::from_reply(record.frame.data()).unwrap();
+            assert_eq!(owed.take(), Some(register));
             answered += 1;
         }
     };

@@ -8,10 +8,11 @@ mod motors;
 #[path = "../examples/socketcan/robot.rs"]
 mod robot;
 
+use drivetrain::encoder::GearRatio;
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{
     DamiaoDrive, Drive, DriveShaft, Line, LkDrive, MotorConfig, MotorKey, OdriveDrive, RmdDrive,
-    RobStrideDrive, Simulation, VescDrive, VescMotor,
+    RobStrideDrive, Simulation, VescDrive,
 };
 use drivetrain::time::Duration;
 use drivetrain::units::AngularVelocity;
@@ -51,14 +52,15 @@ fn robstride(id: u8) -> RobStrideDrive {
 }
 
 fn vesc(id: u8) -> VescDrive {
-    let motor = VescMotor {
+    let model = drivetrain::vesc::Model {
+        name: "VESC",
         pole_pairs: 7,
-        gear: 1.0,
+        gear: GearRatio::DIRECT,
         torque_constant_nm_per_a: 0.035,
-        current_max_a: 60.0,
-        no_load_rad_per_s: 600.0,
+        current_limit_a: 60.0,
+        max_velocity: AngularVelocity::from_rad_per_s(600.0),
     };
-    VescDrive::new(id, motor).with_timeout(0.1, 0.0).with_status_hz(500.0)
+    VescDrive::of(model, id).with_timeout(0.1, 0.0).with_status_hz(500.0)
 }
 
 fn odrive(node: u8, is_0_6: bool) -> OdriveDrive {

@@ -3,9 +3,11 @@
 #![cfg(test)]
 
 use drivetrain::error::ConfigError;
+use drivetrain::motor::Impedance;
+use drivetrain::units::{Angle, AngularVelocity};
 use drivetrain::wire::feetech::{self, Goal, Present, ServoId, Status};
 use drivetrain::wire::host_link::{
-    COMMAND_LENGTH, HostCommand, JointTarget, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
+    COMMAND_LENGTH, HostCommand, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
 };
 use drivetrain::wire::mit;
 use drivetrain::wire::vofa::{JustFloat, justfloat, text_line};
@@ -23,8 +25,8 @@ fn any_command() -> impl Strategy<Value = HostCommand> {
     let joints = any::<[(u8, i32); 12]>();
     (joints, any::<[i16; 3]>(), any::<u8>()).prop_map(|(joints, [gm6020, c610, sts3032], reset)| {
         HostCommand {
-            joints: joints
-                .map(|(speed_rpm, position_pulses)| JointTarget { speed_rpm, position_pulses }),
+            positions_pulses: joints.map(|(_, position_pulses)| position_pulses),
+            speeds_rpm: joints.map(|(speed_rpm, _)| speed_rpm),
             gm6020_position: gm6020,
             c610_position: c610,
             sts3032_degrees: sts3032,
@@ -159,14 +161,20 @@ fn ranges() -> mit::Ranges {
     mit::Ranges::new(12.5, 30.0, 10.0).unwrap()
 }
 
-fn command(fields: [f32; 5]) -> mit::Command {
-    let [position_rad, velocity_rad_per_s, kp, kd, torque_nm] = fields;
-    mit::Command { position_rad, velocity_rad_per_s, kp, kd, torque_nm }
+fn command(fields: [f32; 5]) -> Impedance {
+    let [position_rad, velocity_rad_per_s, stiffness, damping, torque_nm] = fields;
+    Impedance {
+        angle: Angle::from_radians(position_rad),
+        velocity: AngularVelocity::from_rad_per_s(velocity_rad_per_s),
+        stiffness,
+        damping,
+        torque_nm,
+    }
 }
 
-fn fields(command: mit::Command) -> [f32; 5] {
-    let mit::Command { position_rad, velocity_rad_per_s, kp, kd, torque_nm } = command;
-    [position_rad, velocity_rad_per_s, kp, kd, torque_nm]
+fn fields(command: Impedance) -> [f32; 5] {
+    let Impedance { angle, velocity, stiffness, damping, torque_nm } = command;
+    [angle.as_radians(), velocity.as_rad_per_s(), stiffness, damping, torque_nm]
 }
 
 /// A command frame as the numbers that stand in it.
@@ -216,7 +224,7 @@ fn a_full_command_in_mit_mode_is_no_special_frame() {
     let count = 20.0 / 4_095.0;
     for below in 0..8_u8 {
         let torque_nm = 10.0 - (f32::from(below) - 0.5).max(0.0) * count;
-        let data = ranges().encode(&mit::Command { torque_nm, ..command(ends) });
+        let data = ranges().encode(&Impedance { torque_nm, ..command(ends) });
         let expected = match 0xFF - below {
             0xFB..=0xFE => 0xFA,
             last => last,
@@ -264,8 +272,8 @@ proptest! {
         let [position_rad, velocity_rad_per_s, most_nm] = ends;
         let ranges = mit::Ranges::new(position_rad, velocity_rad_per_s, most_nm).unwrap();
         for torque_nm in [share * most_nm, 0.0, most_nm, -most_nm, f32::NAN] {
-            let alone = mit::Command::torque(torque_nm);
-            let beside = mit::Command { kp: 1e-6, ..alone };
+            let alone = Impedance::torque(torque_nm);
+            let beside = Impedance { stiffness: 1e-6, ..alone };
             prop_assert_eq!(ranges.encode(&alone), ranges.encode(&beside));
         }
     }
@@ -297,14 +305,14 @@ proptest! {
         torque_nm in 1e-3_f32..1e6,
     ) {
         let ranges = mit::Ranges::new(position_rad, velocity_rad_per_s, torque_nm).unwrap();
-        let rest = ranges.encode(&mit::Command::REST);
+        let rest = ranges.encode(&Impedance::FREE);
         let mut broken = [position_rad, velocity_rad_per_s, 500.0, 5.0, torque_nm];
         prop_assert_eq!(counts(ranges.encode(&command(broken))), [0xFFFF, 0xFFF, 0xFFF, 0xFFF, 0xFFF]);
         broken[place] = f32::NAN;
         prop_assert_eq!(ranges.encode(&command(broken)), rest);
         prop_assert_eq!(counts(rest), [0x7FFF, 0x7FF, 0, 0, 0x7FF]);
         let sent = ranges.decode(&rest);
-        prop_assert!(sent.kp == 0.0 && sent.kd == 0.0);
+        prop_assert!(sent.stiffness == 0.0 && sent.damping == 0.0);
         prop_assert!(sent.torque_nm.abs() <= torque_nm / 4_095.0 * 1.001); // half a count
     }
 

@@ -7,7 +7,7 @@ use std::fmt::Debug;
 use drivetrain::wire::feetech::{self, Status};
 use drivetrain::wire::hipnuc::Imu;
 use drivetrain::wire::host_link::{
-    COMMAND_LENGTH, HostCommand, JointTarget, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
+    COMMAND_LENGTH, HostCommand, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
 };
 use drivetrain::wire::referee::{self, RefereeMessage};
 use drivetrain::wire::vofa::{JustFloat, justfloat};
@@ -41,19 +41,19 @@ impl Subject for HostCommand {
         let mut bytes = scramble(seed);
         let mut byte = || bytes.next().unwrap();
         let mut command = Self::default();
-        for joint in &mut command.joints {
+        for joint in 0..12 {
             // Now and then a whole header, or half of one, inside of the payload.
             let position = match byte() % 4 {
                 0 => [0xAA, 0x55, 0x01, 0x4B],
                 1 => [byte(), byte(), 0xAA, 0x55],
                 _ => [byte(), byte(), byte(), byte()],
             };
-            *joint =
-                JointTarget { speed_rpm: byte(), position_pulses: i32::from_be_bytes(position) };
+            command.speeds_rpm[joint] = byte();
+            command.positions_pulses[joint] = i32::from_be_bytes(position);
         }
         if seed.is_multiple_of(3) {
-            command.joints[5].position_pulses = i32::from_be_bytes([0, 0, 0xAA, 0x55]);
-            command.joints[6] = JointTarget { speed_rpm: 1, position_pulses: 0x4B31_10AA };
+            command.positions_pulses[5] = i32::from_be_bytes([0, 0, 0xAA, 0x55]);
+            (command.speeds_rpm[6], command.positions_pulses[6]) = (1, 0x4B31_10AA);
         }
         command.reset = Reset::from_raw(byte());
         command.encode(&mut [0; COMMAND_LENGTH]).unwrap().to_vec()

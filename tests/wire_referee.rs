@@ -7,9 +7,7 @@ use drivetrain::chassis::CapacitorPlan;
 use drivetrain::frame::CanFrame;
 use drivetrain::time::{Duration, Edge, Instant};
 use drivetrain::wire::dbus::Keys;
-use drivetrain::wire::referee::{
-    MAX_FRAME, PowerHeat, Referee, RefereeMessage, RobotState, ShotData, encode,
-};
+use drivetrain::wire::referee::{MAX_FRAME, Referee, RefereeMessage, encode};
 use drivetrain::wire::supercap::{hkust, pacific_spirit};
 use drivetrain::wire::vt13::{DEAD_BAND, FRAME_LENGTH, ModeSwitch, VideoRemote};
 use drivetrain::wire::{Counts, Decode, Deframer, Receiver, Silence};
@@ -67,7 +65,7 @@ fn message(id: &str) -> RefereeMessage {
 fn referee_robot_states_of_both_layouts() {
     for id in ["referee.0201.13", "referee.0201.17"] {
         let expect = &vector(id)["expect"];
-        let state = RobotState {
+        let state = RefereeMessage::Robot {
             robot_id: number(&expect["robot_id"]),
             level: number(&expect["level"]),
             hp: number(&expect["hp"]),
@@ -82,7 +80,7 @@ fn referee_robot_states_of_both_layouts() {
             chassis_is_powered: expect["outputs"][1].as_bool().unwrap(),
             shooter_is_powered: expect["outputs"][2].as_bool().unwrap(),
         };
-        assert_eq!(message(id), RefereeMessage::Robot(state), "{id}");
+        assert_eq!(message(id), state, "{id}");
     }
 }
 
@@ -90,7 +88,7 @@ fn referee_robot_states_of_both_layouts() {
 fn referee_power_and_heat_of_both_layouts_and_a_shot() {
     for id in ["referee.0202.16", "referee.0202.14"] {
         let expect = &vector(id)["expect"];
-        let power = PowerHeat {
+        let power = RefereeMessage::Power {
             buffer_energy_j: number(&expect["buffer_j"]),
             heat_17mm: number(&expect["heat_17mm"]),
             heat_17mm_second: expect["heat_17mm_second"]
@@ -98,26 +96,27 @@ fn referee_power_and_heat_of_both_layouts_and_a_shot() {
                 .map(|heat| heat.try_into().unwrap()),
             heat_42mm: number(&expect["heat_42mm"]),
         };
-        assert_eq!(message(id), RefereeMessage::Power(power), "{id}");
+        assert_eq!(message(id), power, "{id}");
     }
     let expect = &vector("referee.0207")["expect"];
-    let shot = ShotData {
+    let shot = RefereeMessage::Shot {
         projectile: number(&expect["projectile"]),
         shooter: number(&expect["shooter"]),
         rate_hz: number(&expect["rate_hz"]),
         muzzle_velocity_m_s: float(&expect["velocity"]),
     };
-    assert_eq!(message("referee.0207"), RefereeMessage::Shot(shot));
+    assert_eq!(message("referee.0207"), shot);
 }
 
 #[test]
 fn referee_frames_of_other_commands_and_lengths_are_raw() {
-    let RefereeMessage::Raw(status) = message("referee.game_status") else { panic!() };
+    let status = message("referee.game_status");
+    let (command, data) = status.as_raw().unwrap();
     let expect = &vector("referee.game_status")["expect"];
-    assert_eq!((status.command(), status.data().len()), (1, number(&expect["data_length"])));
-    assert_eq!(u64::from(status.data()[0] & 0xF), expect["game_type"]);
-    let RefereeMessage::Raw(old) = message("referee.0201.27") else { panic!() };
-    assert_eq!((old.command(), old.data().len()), (0x0201, 27));
+    assert_eq!((command, data.len()), (1, number(&expect["data_length"])));
+    assert_eq!(u64::from(data[0] & 0xF), expect["game_type"]);
+    let old = message("referee.0201.27");
+    assert_eq!(old.as_raw().map(|(command, data)| (command, data.len())), Some((0x0201, 27)));
     assert!(format!("{old:?}").contains("data: [0, 1, 2"), "{old:?}");
 }
 

@@ -2,13 +2,14 @@
 
 #![cfg(test)]
 
+use drivetrain::motor::Impedance;
 use drivetrain::time::Instant;
-use drivetrain::units::Angle;
+use drivetrain::units::{Angle, AngularVelocity};
 use drivetrain::wire::dbus::{Dbus, Keys, Switch};
 use drivetrain::wire::feetech::{self, Goal, Present, ServoId, Status, register};
 use drivetrain::wire::hipnuc::{self, Imu};
 use drivetrain::wire::host_link::{
-    COMMAND_LENGTH, HostCommand, JointTarget, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
+    COMMAND_LENGTH, HostCommand, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
 };
 use drivetrain::wire::mit;
 use drivetrain::wire::{Counts, Decode, Deframer};
@@ -149,14 +150,11 @@ fn hipnuc_euler_angles_of_the_quaternion_are_those_of_the_firmware() {
 }
 
 fn command(input: &Value) -> HostCommand {
-    let speeds = integers::<u8>(&input["speeds_rpm_u8"]);
-    let positions = integers::<i32>(&input["positions_i32"]);
     let mut command = HostCommand::default();
-    for ((joint, speed_rpm), position_pulses) in
-        command.joints.iter_mut().zip(speeds).zip(positions)
-    {
-        *joint = JointTarget { speed_rpm, position_pulses };
-    }
+    let speeds = integers::<u8>(&input["speeds_rpm_u8"]);
+    command.speeds_rpm.iter_mut().zip(speeds).for_each(|(place, speed_rpm)| *place = speed_rpm);
+    let positions = integers::<i32>(&input["positions_i32"]);
+    command.positions_pulses.iter_mut().zip(positions).for_each(|(place, pulses)| *place = pulses);
     let number = |name: &str| i16::try_from(input[name].as_i64().unwrap()).unwrap();
     command.gm6020_position = number("gm6020");
     command.c610_position = number("c610");
@@ -174,9 +172,9 @@ fn host_link_commands_in_both_directions() {
         let (frames, counts) = frames::<HostCommand, COMMAND_LENGTH>((), &frame);
         assert_eq!((frames, counts.skipped_bytes), (vec![command], 0));
     }
-    let first = command(&vector("snake.cmd.ramp")["input"]).joints[0];
+    let first = command(&vector("snake.cmd.ramp")["input"]).speeds_pulses_per_s()[0];
     let expected = &vector("snake.cmd.ramp")["expect"]["speed_pulse_per_s_of_first"];
-    assert_eq!(i64::from(first.speed_pulses_per_s()), *expected);
+    assert_eq!(i64::from(first), *expected);
 }
 
 #[test]
@@ -312,11 +310,11 @@ fn mit_commands() {
         let [p, v, t] = ["p", "v", "t"].map(|name| number(&limits[name]));
         let ranges = mit::Ranges::new(p, v, t).unwrap();
         let field = |name: &str| number(&input[name]);
-        let command = mit::Command {
-            position_rad: field("p"),
-            velocity_rad_per_s: field("v"),
-            kp: field("kp"),
-            kd: field("kd"),
+        let command = Impedance {
+            angle: Angle::from_radians(field("p")),
+            velocity: AngularVelocity::from_rad_per_s(field("v")),
+            stiffness: field("kp"),
+            damping: field("kd"),
             torque_nm: field("t"),
         };
         assert_eq!(ranges.encode(&command)[..], hex(&vector["expect"]["data"])[..], "{id}");
@@ -332,15 +330,17 @@ fn mit_fields() {
         let (input, expected) = (&vector["input"], vector["expect"]["u"].as_u64().unwrap());
         let (value, range) = (number(&input["x"]), number(&input["max"]));
         let ranges = |p, v| mit::Ranges::new(p, v, 1.0).unwrap();
-        let mut command = mit::Command::REST;
-        let (ranges, field) = if input["bits"] == 16 {
-            (ranges(range, 1.0), &mut command.position_rad)
+        let free = Impedance::FREE;
+        let (ranges, command) = if input["bits"] == 16 {
+            let angle = Angle::from_radians(value);
+            (ranges(range, 1.0), Impedance { angle, ..free })
         } else if input["min"] == 0 {
-            (ranges(1.0, 1.0).with_gains(range, 1.0).unwrap(), &mut command.kp)
+            let gains = ranges(1.0, 1.0).with_gains(range, 1.0).unwrap();
+            (gains, Impedance { stiffness: value, ..free })
         } else {
-            (ranges(1.0, range), &mut command.velocity_rad_per_s)
+            let velocity = AngularVelocity::from_rad_per_s(value);
+            (ranges(1.0, range), Impedance { velocity, ..free })
         };
-        *field = value;
         let bits = u64::from_be_bytes(ranges.encode(&command));
         let sent = match (input["bits"].as_u64(), input["min"].as_f64()) {
             (Some(16), _) => bits >> 48,

@@ -96,7 +96,8 @@ impl<M: OwnMotor> Listener for Own<M> {
             rpm: motor.velocity().as_rpm(),
             amperes: None,
             temperature_c: vitals.temperature_c,
-            error: vitals.error.map(|_| format!("error {}", vitals.error_code)),
+            error: (vitals.has_fault || vitals.has_warning)
+                .then(|| format!("error {}", vitals.error_code)),
             rotor_counts: None,
             ambiguous_gaps: 0,
         })

@@ -3,7 +3,6 @@
 use super::scenario::{Run, Sample};
 use super::silence::Silence;
 use drivetrain::chassis::MecanumWheels;
-use drivetrain::wire::parameters::ParameterCounts;
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{BufWriter, Result, Write};
@@ -43,10 +42,10 @@ pub(crate) fn table(run: &Run) -> String {
     _ = writeln!(text, "path         {path_max:.3} m off at most, {path_end:.3} m at the end");
     if let Some((answers, counts)) = &run.serial {
         text.push_str(answers);
-        let ParameterCounts { accepted, out_of_range, unknown, malformed } = counts;
         _ = writeln!(
             text,
-            "serial       {accepted} lines accepted, {out_of_range} out of range, {unknown} unknown, {malformed} malformed"
+            "serial       {} lines accepted, {} out of range, {} unknown, {} malformed",
+            counts.frames, counts.content_errors, counts.foreign_frames, counts.length_errors
         );
     }
     let statistics = &run.statistics;
@@ -62,7 +61,7 @@ pub(crate) fn table(run: &Run) -> String {
         statistics.received,
         statistics.sent,
         statistics.refused,
-        statistics.send_errors.total(),
+        statistics.send_errors(),
         statistics.evicted,
         statistics.overruns
     );

@@ -14,7 +14,7 @@ use drivetrain::sim::{
 };
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
-use drivetrain::wire::parameters::ParameterCounts;
+use drivetrain::wire::Counts;
 use std::error::Error;
 
 pub(crate) const WHEEL_RADIUS_M: f32 = 0.076;
@@ -108,7 +108,7 @@ pub(crate) struct Run {
     /// The longest time in which the trouble kept all commands from the ESCs.
     pub(crate) silence: Option<Silence>,
     /// What the robot answered over the serial port, and how many lines it took.
-    pub(crate) serial: Option<(String, ParameterCounts)>,
+    pub(crate) serial: Option<(String, Counts)>,
 }
 
 impl Scenario {

@@ -4,7 +4,8 @@ use super::scenario::{SPEED, Wheels, at};
 use drivetrain::dji::Bus;
 use drivetrain::sim::SerialLine;
 use drivetrain::time::Instant;
-use drivetrain::wire::parameters::{Parameter, ParameterCounts, ParameterRequest, Parameters};
+use drivetrain::wire::Counts;
+use drivetrain::wire::parameters::{Parameter, ParameterRequest, Parameters};
 use std::error::Error;
 use std::fmt::Write;
 
@@ -101,7 +102,7 @@ impl SerialPort {
     }
 
     /// What the robot answered, and how many lines it took.
-    pub(crate) fn finish(self) -> (String, ParameterCounts) {
+    pub(crate) fn finish(self) -> (String, Counts) {
         (self.answers, self.parameters.counts())
     }
 }

@@ -10,7 +10,7 @@ use drivetrain::motor::{
     VelocityDrive,
 };
 use drivetrain::sim::{
-    DamiaoDrive, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive, VescMotor,
+    DamiaoDrive, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive,
 };
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
@@ -142,15 +142,8 @@ fn vesc_of(kind: u8, input: &mut Input) {
         max_velocity: AngularVelocity::from_rad_per_s(300.0),
     };
     fn bench(mode: vesc::Mode, limits: Limits, input: &mut Input) {
-        let motor = VescMotor {
-            pole_pairs: 7,
-            gear: 1.0,
-            torque_constant_nm_per_a: 0.05,
-            current_max_a: 40.0,
-            no_load_rad_per_s: 300.0,
-        };
         let motor_of = vesc::Motor::new(MODEL, 23, mode).unwrap();
-        let drive = VescDrive::new(23, motor).with_status_hz(1_000.0);
+        let drive = VescDrive::of(MODEL, 23).with_current_max(40.0).with_status_hz(1_000.0);
         run(motor_of, drive, limits, |_, _, _| {})(input);
     }
     let rest = Limits::REST;

@@ -249,10 +249,10 @@ fuzz_target!(|data: &[u8]| {
     let can = &runner.port_mut().0;
     assert_eq!(s.received, can.delivered + direct, "I6");
     assert_eq!(s.received, s.taken + s.unrelated + s.malformed, "I6");
-    assert_eq!(s.receive_errors.total(), can.receive_errors, "I6");
+    assert_eq!(s.receive_errors(), can.receive_errors, "I6");
     assert_eq!(s.offered, can.offered, "I6");
-    assert_eq!((s.sent, s.refused, s.send_errors.total()), (can.accepted, can.full, can.failed));
-    assert_eq!(s.offered, s.sent + s.refused + s.send_errors.total(), "I6");
+    assert_eq!((s.sent, s.refused, s.send_errors()), (can.accepted, can.full, can.failed));
+    assert_eq!(s.offered, s.sent + s.refused + s.send_errors(), "I6");
     assert_eq!(s.evicted + s.evicted_unrelated, can.evicted, "I6");
     assert_eq!(left, can.accepted - can.evicted_own, "I6: what came back is offered again");
     assert_eq!(s.superseded, superseded);

@@ -4,7 +4,7 @@
 use drivetrain::encoder::Position;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Devices, Ingest, Link};
-use drivetrain::snake::{Command, Config, Joint, Joints, Register, Reply};
+use drivetrain::snake::{Command, Config, Joint, Joints, Register};
 use drivetrain::time::{Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use drivetrain_fuzz::Gesture;
@@ -240,7 +240,7 @@ impl Story {
                     _ => known.raw,
                 };
                 let id = StandardId::new(raw_id.into()).expect("an id");
-                let reply = CanFrame::new(id, &Reply::new(register, value).encode());
+                let reply = CanFrame::new(id, &register.reply(value));
                 self.watch(|story| hear(story, &reply.expect("six bytes")));
             }
             self.watch(|story| {
@@ -281,12 +281,12 @@ impl Story {
         match outcome {
             Ingest::Taken => {
                 self.taken += 1;
-                let reply = Reply::decode(frame.data()).expect("a reply");
+                let (register, value) = Register::from_reply(frame.data()).expect("a reply");
                 let known = &mut self.known[index_of(frame).expect("of an attached joint")];
-                if reply.register() == Register::ActualPosition {
+                if register == Register::ActualPosition {
                     known.heard = Some(self.now);
                     known.news[0] = true;
-                    known.raw = reply.value();
+                    known.raw = value;
                 }
             }
             Ingest::Malformed(_) => self.malformed += 1,

@@ -4,7 +4,7 @@
 use core::array::from_fn;
 use drivetrain::wire::Decode;
 use drivetrain::wire::host_link::{
-    COMMAND_LENGTH, HostCommand, JointTarget, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
+    COMMAND_LENGTH, HostCommand, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
 };
 use drivetrain_fuzz::{Input, any_split_gives_the_same, refuses_a_flipped_bit};
 use libfuzzer_sys::fuzz_target;
@@ -18,14 +18,19 @@ fuzz_target!(|data: &[u8]| {
 });
 
 fn command(input: &mut Input) -> Vec<u8> {
-    let joints = from_fn(|_| JointTarget {
-        speed_rpm: input.byte(),
-        position_pulses: i32::from_le_bytes(input.bytes()),
-    });
+    let speeds_rpm = from_fn(|_| input.byte());
+    let positions_pulses = from_fn(|_| i32::from_le_bytes(input.bytes()));
     let [gm6020_position, c610_position, sts3032_degrees] =
         from_fn(|_| i16::from_le_bytes(input.bytes()));
     let reset = Reset::from_raw(input.byte());
-    let command = HostCommand { joints, gm6020_position, c610_position, sts3032_degrees, reset };
+    let command = HostCommand {
+        positions_pulses,
+        speeds_rpm,
+        gm6020_position,
+        c610_position,
+        sts3032_degrees,
+        reset,
+    };
     let frame = command.encode(&mut [0; COMMAND_LENGTH]).expect("room").to_vec();
     assert_eq!(HostCommand::decode(&(), &frame), Ok(command));
     refuses_a_flipped_bit::<HostCommand>(&(), &frame);

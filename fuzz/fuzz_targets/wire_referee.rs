@@ -40,30 +40,52 @@ fn message(input: &mut Input) -> Vec<u8> {
     let bytes = |at: usize| u16::from_le_bytes([data[at], data[at + 1]]);
     let refused = |speed: f32| !(speed.is_finite() && speed >= 0.0);
     match (RefereeMessage::decode(&(), &frame), command, length) {
-        (Ok(RefereeMessage::Robot(state)), 0x0201, 13 | 17) => {
-            let told = [state.hp, state.max_hp, state.barrel_cooling_per_s];
-            assert_eq!(told, [2, 4, 6].map(bytes));
-            let told = [state.barrel_heat_limit, state.chassis_power_limit_w];
-            assert_eq!(told, [8, 10].map(bytes));
-            let outputs =
-                [state.gimbal_is_powered, state.chassis_is_powered, state.shooter_is_powered];
+        (
+            Ok(RefereeMessage::Robot {
+                robot_id,
+                level,
+                hp,
+                max_hp,
+                barrel_cooling_per_s,
+                barrel_heat_limit,
+                chassis_power_limit_w,
+                muzzle_velocity_limit_m_s,
+                gimbal_is_powered,
+                chassis_is_powered,
+                shooter_is_powered,
+            }),
+            0x0201,
+            13 | 17,
+        ) => {
+            assert_eq!([robot_id, level], data[..2]);
+            assert_eq!([hp, max_hp, barrel_cooling_per_s], [2, 4, 6].map(bytes));
+            assert_eq!([barrel_heat_limit, chassis_power_limit_w], [8, 10].map(bytes));
+            let outputs = [gimbal_is_powered, chassis_is_powered, shooter_is_powered];
             assert_eq!(outputs, [1, 2, 4].map(|bit| data[length - 1] & bit != 0));
-            let told = state.muzzle_velocity_limit_m_s.map(f32::to_bits);
+            let told = muzzle_velocity_limit_m_s.map(f32::to_bits);
             assert_eq!(told, (length == 17).then(|| speed(12).to_bits()));
-            assert!(length == 13 || !refused(speed(12)), "I2: {state:?}");
+            assert!(length == 13 || !refused(speed(12)), "I2: {muzzle_velocity_limit_m_s:?}");
         }
-        (Ok(RefereeMessage::Power(power)), 0x0202, 14 | 16) => {
-            assert_eq!([power.buffer_energy_j, power.heat_17mm], [8, 10].map(bytes));
-            assert_eq!(power.heat_42mm, bytes(length - 2));
-            assert_eq!(power.heat_17mm_second, (length == 16).then(|| bytes(12)));
+        (
+            Ok(RefereeMessage::Power { buffer_energy_j, heat_17mm, heat_17mm_second, heat_42mm }),
+            0x0202,
+            14 | 16,
+        ) => {
+            assert_eq!([buffer_energy_j, heat_17mm], [8, 10].map(bytes));
+            assert_eq!(heat_42mm, bytes(length - 2));
+            assert_eq!(heat_17mm_second, (length == 16).then(|| bytes(12)));
         }
-        (Ok(RefereeMessage::Shot(shot)), 0x0207, 7) => {
-            assert_eq!([shot.projectile, shot.shooter, shot.rate_hz], data[..3]);
-            assert_eq!(shot.muzzle_velocity_m_s.to_bits(), speed(3).to_bits());
-            assert!(!refused(speed(3)), "I2: {shot:?}");
+        (
+            Ok(RefereeMessage::Shot { projectile, shooter, rate_hz, muzzle_velocity_m_s }),
+            0x0207,
+            7,
+        ) => {
+            assert_eq!([projectile, shooter, rate_hz], data[..3]);
+            assert_eq!(muzzle_velocity_m_s.to_bits(), speed(3).to_bits());
+            assert!(!refused(speed(3)), "I2: {muzzle_velocity_m_s}");
         }
-        (Ok(RefereeMessage::Raw(raw)), _, _) => {
-            assert_eq!((raw.command(), raw.data()), (command, &data[..]));
+        (Ok(raw @ RefereeMessage::Raw { .. }), _, _) => {
+            assert_eq!(raw.as_raw(), Some((command, &data[..])));
         }
         (outcome, 0x0201, 17) => assert!(outcome.is_err() && refused(speed(12)), "{outcome:?}"),
         (outcome, 0x0207, 7) => assert!(outcome.is_err() && refused(speed(3)), "{outcome:?}"),

@@ -2,7 +2,8 @@
 
 use crate::{Defect, Outcome};
 use drivetrain::damiao::{Command, Feedback, Model};
-use drivetrain::wire::mit;
+use drivetrain::motor::Impedance;
+use drivetrain::units::{Angle, AngularVelocity};
 use std::io::{Read, Write};
 
 /// Reads commands of five `f32`, low byte first, and writes the data of their frames. The fields are those of the mode, in their
@@ -39,11 +40,17 @@ pub fn encode(
     Ok(())
 }
 
-fn mit(defect: Defect, model: &Model, [p, v, kp, kd, t]: [f32; 5]) -> mit::Command {
-    let command = mit::Command { position_rad: p, velocity_rad_per_s: v, kp, kd, torque_nm: t };
+fn mit(defect: Defect, model: &Model, [p, v, kp, kd, t]: [f32; 5]) -> Impedance {
+    let command = Impedance {
+        angle: Angle::from_radians(p),
+        velocity: AngularVelocity::from_rad_per_s(v),
+        stiffness: kp,
+        damping: kd,
+        torque_nm: t,
+    };
     match defect {
-        Defect::Scale => mit::Command { kd: kd * 4096.0 / 4095.0, ..command },
-        Defect::Rounded => mit::Command { torque_nm: t + model.tmax_nm() / 4095.0, ..command },
+        Defect::Scale => Impedance { damping: kd * 4096.0 / 4095.0, ..command },
+        Defect::Rounded => Impedance { torque_nm: t + model.tmax_nm() / 4095.0, ..command },
         _ => command,
     }
 }

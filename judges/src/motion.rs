@@ -8,7 +8,7 @@
 //! ```
 
 use crate::{Outcome, floats};
-use drivetrain::control::{Motion, MotionLimits, MotionTarget, Motions, ProfileState};
+use drivetrain::control::{Motion, MotionLimits, Motions, ProfileState};
 use std::io::{Read, Write};
 
 /// A mistake that the judge has to find.
@@ -93,7 +93,7 @@ fn step(
     Ok(())
 }
 
-type Case = (ProfileState, MotionTarget, MotionLimits);
+type Case = (ProfileState, ProfileState, MotionLimits);
 
 /// Reads a motion; `None` at the end of the input.
 fn read(defect: Defect, input: &mut impl Read) -> Outcome<Option<Case>> {
@@ -102,7 +102,11 @@ fn read(defect: Defect, input: &mut impl Read) -> Outcome<Option<Case>> {
     let [position, velocity, acceleration, target, target_velocity, top, steep, jerk] = case;
     let limits = MotionLimits::new(top, steep).with_jerk(jerk);
     let from = ProfileState { position, velocity, acceleration };
-    Ok(Some((from, MotionTarget { position: target, velocity: target_velocity }, limits)))
+    Ok(Some((
+        from,
+        ProfileState { position: target, velocity: target_velocity, ..ProfileState::default() },
+        limits,
+    )))
 }
 
 fn times(duration_s: f32, samples: u16) -> impl Iterator<Item = f32> {

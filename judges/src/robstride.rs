@@ -17,9 +17,11 @@
 
 use crate::{Defect, Outcome};
 use drivetrain::frame::CanFrame;
+use drivetrain::motor::Impedance;
 use drivetrain::robstride::{Command, Feedback, Model, Register};
 use drivetrain::sim::{Drive, RobStrideDrive};
-use drivetrain::wire::mit::{self, Ranges};
+use drivetrain::units::{Angle, AngularVelocity};
+use drivetrain::wire::mit::Ranges;
 use embedded_can::ExtendedId;
 use std::fmt::Write as _;
 use std::io::{BufRead, Read, Write};
@@ -77,8 +79,13 @@ fn encode(
         let [p, v, kp, kd, t] = [0, 1, 2, 3, 4].map(|place| f32::from_le_bytes(fields[place]));
         let kd = if defect == Defect::Scale { kd * 65_536.0 / 65_535.0 } else { kd };
         let up = if defect == Defect::Rounded { model.tmax_nm() / 65_535.0 } else { 0.0 };
-        let command =
-            mit::Command { position_rad: p, velocity_rad_per_s: v, kp, kd, torque_nm: t + up };
+        let command = Impedance {
+            angle: Angle::from_radians(p),
+            velocity: AngularVelocity::from_rad_per_s(v),
+            stiffness: kp,
+            damping: kd,
+            torque_nm: t + up,
+        };
         let frame = Command::Operation(command).encode(model, HOST, 1);
         output.write_all(&id_of(&frame).to_le_bytes())?;
         output.write_all(&planted(*frame.bytes(), defect))?;

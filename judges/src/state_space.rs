@@ -15,7 +15,7 @@
 use crate::defect::{defects, factor};
 use crate::{Outcome, floats};
 use drivetrain::control::state_space::{
-    KalmanFilter, LinearQuadraticRegulator, LinearSystem, LuenbergerObserver, PlantInversion,
+    KalmanFilter, LinearQuadraticRegulator, LinearSystem, LuenbergerObserver,
 };
 use std::io::{Read, Write};
 
@@ -104,8 +104,8 @@ fn design<const N: usize, const M: usize>(
     let observer = LuenbergerObserver::steady_state(&same, &c, &noise, &of_output).ok();
     write(&observer.map_or([[f32::NAN; M]; N], |observer| observer.gain()), output)?;
     write(&plant.as_ref().and_then(gain).unwrap_or([[f32::NAN; N]; M]), output)?;
-    let inversion = PlantInversion::new(&same).ok();
-    write(&[inversion.map_or([f32::NAN; M], |it| it.effort(&[0.0; N], &[1.0; N]))], output)
+    let inverse = same.input_inverse().ok();
+    write(&[inverse.map_or([f32::NAN; M], |it| same.effort(&it, &[0.0; N], &[1.0; N]))], output)
 }
 
 fn filter<const N: usize, const M: usize>(

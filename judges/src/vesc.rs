@@ -17,7 +17,7 @@ use crate::Outcome;
 use drivetrain::encoder::GearRatio;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{CanDevice, Ingest, Own, OwnMotor};
-use drivetrain::sim::{Drive, VescDrive, VescMotor};
+use drivetrain::sim::{Drive, VescDrive};
 use drivetrain::time::Instant;
 use drivetrain::units::AngularVelocity;
 use drivetrain::vesc::{Command, Feedback, Mode, Model, Motor};
@@ -274,20 +274,13 @@ fn faults(id: u8, input: &mut impl Read, output: &mut impl Write) -> Outcome<()>
 /// report PACKET   a status frame                                   ID DATA
 /// ```
 fn serve(defect: &str, input: impl BufRead, output: &mut impl Write) -> Outcome<()> {
-    let motor = VescMotor {
-        pole_pairs: 7,
-        gear: 1.0,
-        torque_constant_nm_per_a: 0.05,
-        current_max_a: 40.0,
-        no_load_rad_per_s: 300.0,
-    };
-    let mut drive = VescDrive::new(0, motor);
+    let mut drive = VescDrive::of(MODEL, 0);
     for line in input.lines() {
         let line = line?;
         let words: Vec<&str> = line.split_whitespace().collect();
         let mut answer = String::from("ok");
         match words.as_slice() {
-            ["drive", id] => drive = VescDrive::new(id.parse()?, motor),
+            ["drive", id] => drive = VescDrive::of(MODEL, id.parse()?),
             ["hear", id, data] => {
                 let bytes =
                     (0..data.len() / 2).map(|at| u8::from_str_radix(&data[2 * at..2 * at + 2], 16));

@@ -10,7 +10,7 @@
 //! | the same, with an error from integers | [`Cascade`] | as the motors of a bus do |
 //! | heading of a chassis | [`Pid`] | PD with `with_period`, `with_dead_band` |
 //! | a target from a stick or another computer | [`SlewLimiter`], [`Differentiator::optimal`] | the acceleration the mechanism can take |
-//! | a move from A to B | [`Profile`] and [`FeedForward`] | trapezoid; [`MotionLimits::with_jerk`] when it shakes |
+//! | a move from A to B | [`Profile`] and [`Plant::effort`] | trapezoid; [`MotionLimits::with_jerk`] when it shakes |
 //! | a move from any state, to a target that moves, or of several axes in step | [`Motion`], [`MotionFollower`], [`Motions`] | limits of velocity, acceleration and jerk that the mechanism can take |
 //! | a noisy measurement | [`LowPass`]; [`Biquad`] when that is not steep enough | a cut-off of ten times the loop's bandwidth |
 //! | a resonance | [`Biquad::notch`] | its frequency, q = 2 |
@@ -63,11 +63,11 @@ pub use differentiator::{Differentiator, fhan};
 pub use filter::{Biquad, LowPass, Window};
 pub use identification::{Excitation, Identification, IdentificationError, Plant};
 pub(crate) use matrix::solved;
-pub use motion::{Motion, MotionFollower, MotionTarget, Motions};
+pub use motion::{Motion, MotionFollower, Motions};
 pub(crate) use number::limited;
 pub use observer::LoadObserver;
 
 pub(crate) use pid::ErrorPid;
-pub use pid::{Pid, PidConfig, Terms};
-pub use shaping::{FeedForward, MotionLimits, Profile, ProfileState, SlewLimiter};
+pub use pid::{Pid, PidConfig};
+pub use shaping::{MotionLimits, Profile, ProfileState, SlewLimiter};
 pub use tuning::{RelayTuner, StepResponse, TuningRule, WheelTuning};

@@ -6,9 +6,10 @@ use super::{Feedback, Model, Register, Status};
 use crate::control::PidConfig;
 use crate::error::ConfigError;
 use crate::frame::{CanFrame, standard_id};
+use crate::motor::Impedance;
 use crate::motor::{
     Capabilities, Capability, Claim, Ingest, Inquiry, Malformed, MotorName, Order, OwnMotor,
-    Preparation, Role, Settings, Severity, TimeoutUnits, Vitals, WrongSetting, register_questions,
+    Preparation, Role, Settings, TimeoutUnits, Vitals, WrongSetting, register_questions,
 };
 use crate::time::Duration;
 use crate::units::{Angle, AngularVelocity};
@@ -185,7 +186,7 @@ impl OwnMotor for Motor {
 
     fn rest(&mut self) -> CanFrame {
         if self.mode.0.is_impedance() {
-            let rest = self.model.ranges().encode(&mit::Command::REST);
+            let rest = self.model.ranges().encode(&Impedance::FREE);
             CanFrame::of(standard_id(self.id.into()), rest)
         } else {
             self.off()
@@ -268,7 +269,8 @@ impl OwnMotor for Motor {
         let Some(drive) = self.drive else { return Vitals::default() };
         Vitals {
             temperature_c: Some(drive.driver_c.max(drive.rotor_c).into()),
-            error: drive.status.is_error().then_some(Severity::Fault),
+            has_fault: drive.status.is_error(),
+            has_warning: false,
             error_code: drive.status.error_code(),
             effort: self.mode.0.effort(),
             speed: drive.measured.velocity_rad_per_s / self.model.vmax_rad_per_s(),

@@ -2,6 +2,7 @@
 
 use super::Register;
 use crate::frame::{CanFrame, standard_id};
+use crate::motor::Impedance;
 use crate::motor::Inquiry;
 use crate::units::Angle;
 use crate::wire::mit;
@@ -30,7 +31,7 @@ pub(super) const MOST_VELOCITY: f32 = 100.0;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Command {
     /// A spring, a damper and a torque.
-    Mit(mit::Command),
+    Mit(Impedance),
     /// To a position in rad, at most so fast, in rad/s.
     PositionVelocity(f32, f32),
     /// At a velocity in rad/s.

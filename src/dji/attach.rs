@@ -20,7 +20,7 @@ pub(super) const fn attach<const N: usize>(
     config: &PlainConfig,
 ) -> Result<Key, AttachError> {
     let motor = MotorName::new(facts.name, config.id);
-    let Some((frame, slot)) = facts.place(config.id) else {
+    let Some((frame, slot)) = facts.place_in(config.id) else {
         return Err(AttachError::Id { motor, highest: facts.ids });
     };
     let feedback_id = facts.feedback_base + config.id as u16;
@@ -35,7 +35,7 @@ pub(super) const fn attach<const N: usize>(
     };
     let place = Place::new(frame, slot);
     if let Some(with) = here.name() {
-        let slot = if here.place.same_as(place) { Some((frame, slot)) } else { None };
+        let slot = if here.place.same_as(place) { Some((frame.id(), slot)) } else { None };
         return Err(AttachError::Collision { motor, with, feedback_id, slot });
     }
     let Some(generation) = here.next_generation() else {

@@ -1,6 +1,5 @@
 //! Errors of attaching a motor.
 
-use super::CommandFrame;
 use crate::motor::{BusLoad, MotorName};
 
 /// Reason for a refused motor. The bus stays as before.
@@ -22,8 +21,8 @@ pub enum AttachError {
         with: MotorName,
         /// The feedback id of both.
         feedback_id: u16,
-        /// The common command frame and slot, if there is one.
-        slot: Option<(CommandFrame, u8)>,
+        /// The id of the common command frame, and the common slot in the frame, if there is one.
+        slot: Option<(u16, u8)>,
     },
     /// A parameter of the configuration is not usable.
     Parameter {
@@ -95,11 +94,9 @@ impl AttachError {
                     .text(" on ")
                     .hex(*feedback_id);
                 match slot {
-                    Some((frame, slot)) => message
-                        .text(" and on slot ")
-                        .number(*slot as u32)
-                        .text(" of ")
-                        .hex(frame.id()),
+                    Some((frame, slot)) => {
+                        message.text(" and on slot ").number(*slot as u32).text(" of ").hex(*frame)
+                    }
                     None => message,
                 }
             }
@@ -264,7 +261,7 @@ mod tests {
             |slot| AttachError::Collision { motor: GM6020, with: M3508, feedback_id: 0x205, slot };
         let message = collision(None).to_string();
         assert_eq!(message, "GM6020 (current) #1 collides with M3508 #5 on 0x205");
-        let message = collision(Some((CommandFrame::X1FF, 0))).to_string();
+        let message = collision(Some((0x1FF, 0))).to_string();
         assert_eq!(
             message,
             "GM6020 (current) #1 collides with M3508 #5 on 0x205 and on slot 0 of 0x1FF"

@@ -189,5 +189,5 @@ pub use config::{Config, WordGains};
 pub use error::{AttachError, Message};
 pub use model::{Facts, Gm6020Current, Gm6020Voltage, M2006, M3508, Model};
 pub use motors::{AnyHandle, Handle};
-pub use outbox::CommandFrame;
+use outbox::CommandFrame;
 pub use watch::Counters;

@@ -11,8 +11,7 @@ pub struct Facts {
     pub name: &'static str,
     /// The highest id; the lowest is 1.
     pub ids: u8,
-    /// The command frame of ids 1..=4, and the command frame of higher ids.
-    pub command: [CommandFrame; 2],
+    pub(super) command: [CommandFrame; 2],
     /// The feedback id less the motor's id.
     pub feedback_base: u16,
     /// The largest command, on the wire.
@@ -71,9 +70,31 @@ impl Facts {
         word as f32 / self.command_raw as f32 * self.command_full_scale
     }
 
-    /// Returns command frame and slot of an id; `None` if the model has no such id.
+    /// Returns the ids on the wire of the command frame of ids 1..=4, and of that of higher ids.
     #[must_use]
-    pub const fn place(&self, id: u8) -> Option<(CommandFrame, u8)> {
+    pub const fn command_ids(&self) -> [u16; 2] {
+        let [low, high] = self.command;
+        [low.id(), high.id()]
+    }
+
+    /// Returns the id on the wire of the command frame, and the slot 0 to 3 in the frame; `None` if the model has no such id.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::dji::{M3508, Model};
+    ///
+    /// assert_eq!(M3508::FACTS.place(6), Some((0x1FF, 1)));
+    /// assert_eq!(M3508::FACTS.command_ids(), [0x200, 0x1FF]);
+    /// ```
+    #[must_use]
+    pub const fn place(&self, id: u8) -> Option<(u16, u8)> {
+        match self.place_in(id) {
+            Some((frame, slot)) => Some((frame.id(), slot)),
+            None => None,
+        }
+    }
+
+    pub(super) const fn place_in(&self, id: u8) -> Option<(CommandFrame, u8)> {
         let [low, high] = self.command;
         match id {
             _ if id > self.ids => None,
@@ -257,7 +278,9 @@ mod tests {
                     5..=8 => Some((second, id - 5)),
                     _ => None,
                 };
-                assert_eq!(facts.place(id), place, "{} #{id}", facts.name);
+                assert_eq!(facts.place_in(id), place, "{} #{id}", facts.name);
+                let on_wire = place.map(|(frame, slot)| (frame.id(), slot));
+                assert_eq!(facts.place(id), on_wire, "{} #{id}", facts.name);
             }
         }
     }

@@ -4,8 +4,7 @@ use crate::frame::CanFrame;
 
 /// One of the five command frames: four motors each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum CommandFrame {
+pub(super) enum CommandFrame {
     /// C6x0 #1..=4.
     X200,
     /// C6x0 #5..=8 and GM6020 (voltage) #1..=4.
@@ -20,11 +19,10 @@ pub enum CommandFrame {
 
 impl CommandFrame {
     /// All command frames, in the order of their index.
-    pub const ALL: [Self; 5] = [Self::X200, Self::X1FF, Self::X2FF, Self::X1FE, Self::X2FE];
+    pub(super) const ALL: [Self; 5] = [Self::X200, Self::X1FF, Self::X2FF, Self::X1FE, Self::X2FE];
 
     /// Returns the CAN id.
-    #[must_use]
-    pub const fn id(self) -> u16 {
+    pub(super) const fn id(self) -> u16 {
         match self {
             Self::X200 => 0x200,
             Self::X1FF => 0x1FF,

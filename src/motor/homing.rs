@@ -5,22 +5,11 @@ use crate::error::{ConfigError, check, not_negative, positive};
 use crate::time::{Duration, Instant, Tick};
 use crate::units::{Angle, AngularVelocity};
 
-/// State of a shaft for [`StopHoming`], in the direction of the output shaft.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct ShaftState {
-    /// Position, over many turns.
-    pub position: Position,
-    /// Velocity.
-    pub velocity: AngularVelocity,
-    /// Measured current of the motor in amperes, or its torque in newton metres.
-    pub effort: f32,
-}
+/// Position, velocity and effort of a shaft.
+type Shaft = (Position, AngularVelocity, f32);
 
-impl ShaftState {
-    fn is_finite(&self) -> bool {
-        self.position.is_finite() && self.velocity.is_finite() && self.effort.is_finite()
-    }
+const fn is_finite((position, velocity, effort): &Shaft) -> bool {
+    position.is_finite() && velocity.is_finite() && effort.is_finite()
 }
 
 /// Next action of a homing procedure.
@@ -97,7 +86,7 @@ impl core::fmt::Display for HomingStep {
 /// use drivetrain::control::PidConfig;
 /// use drivetrain::dji::{Bus, Config, M2006};
 /// use drivetrain::encoder::Position;
-/// use drivetrain::motor::{HomingStep, Link, ShaftState, StopHoming};
+/// use drivetrain::motor::{HomingStep, Link, StopHoming};
 /// use drivetrain::runner::{Nb, Runner};
 /// use drivetrain::sim::{MotorConfig, Simulation};
 /// use drivetrain::time::Duration;
@@ -123,11 +112,7 @@ impl core::fmt::Display for HomingStep {
 ///     } else {
 ///         let bus = runner.device_mut();
 ///         let fresh = bus.state(arm).filter(|state| state.link == Link::Online);
-///         let shaft = fresh.map(|state| ShaftState {
-///             position: state.position,
-///             velocity: state.velocity,
-///             effort: state.current.as_amperes(),
-///         });
+///         let shaft = fresh.map(|state| (state.position, state.velocity, state.current.as_amperes()));
 ///         match homing.step(shaft, tick) {
 ///             HomingStep::Drive(velocity) => bus.set_velocity(arm, velocity)?,
 ///             HomingStep::SetPresentPosition(position) => bus.set_present_position(arm, position)?,
@@ -263,55 +248,61 @@ impl StopHoming {
         Ok(Self { back_off, ..self })
     }
 
-    /// Takes the state of the shaft, `None` without fresh feedback, and returns the action of this tick.
+    /// Takes position, velocity and effort of the output shaft, `None` without fresh feedback, and returns the action of this tick.
+    ///
+    /// The position counts over many turns. The effort is the measured current of the motor in amperes, or its torque in newton metres.
     ///
     /// Call this in each tick from the first to the last. Time that goes back counts as standing.
-    pub fn step(&mut self, shaft: Option<ShaftState>, tick: Tick) -> HomingStep {
+    pub fn step(
+        &mut self,
+        shaft: Option<(Position, AngularVelocity, f32)>,
+        tick: Tick,
+    ) -> HomingStep {
         let now = tick.now();
         let started = *self.started.get_or_insert(now);
         if let Phase::Over(last) = self.phase {
             return last;
         }
-        let Some(shaft) = shaft.filter(ShaftState::is_finite) else {
+        let Some(shaft) = shaft.filter(is_finite) else {
             return self.end(HomingStep::LostFeedback);
         };
         if now.since(started) >= self.timeout {
             return self.end(HomingStep::TimedOut);
         }
         match self.phase {
-            Phase::Start => self.approach(shaft, shaft.position, None, now),
+            Phase::Start => self.approach(shaft, shaft.0, None, now),
             Phase::Approach(from, pressing) => self.approach(shaft, from, pressing, now),
-            Phase::Set => self.back_off(shaft, shaft.position),
-            Phase::BackOff(from) => self.back_off(shaft, from),
+            Phase::Set => self.back_off(shaft.0, shaft.0),
+            Phase::BackOff(from) => self.back_off(shaft.0, from),
             Phase::Over(last) => last,
         }
     }
 
     fn approach(
         &mut self,
-        shaft: ShaftState,
+        (position, velocity, effort): Shaft,
         from: Position,
         pressing: Option<Instant>,
         now: Instant,
     ) -> HomingStep {
         let downwards = self.velocity.as_rad_per_s() < 0.0;
-        let effort = if downwards { -shaft.effort } else { shaft.effort };
+        let effort = if downwards { -effort } else { effort };
         // Braked by a load that drives it, a shaft is at no stop.
-        let presses = effort >= self.effort && shaft.velocity.as_rad_per_s().abs() < self.speed;
+        let presses = effort >= self.effort && velocity.as_rad_per_s().abs() < self.speed;
         let since = presses.then(|| pressing.unwrap_or(now));
         if since.is_some_and(|since| now.since(since) >= self.window) {
             self.phase = Phase::Set;
             return HomingStep::SetPresentPosition(self.stop_at);
         }
-        if (shaft.position - from).as_radians().abs() > self.travel.as_radians() {
+        if (position - from).as_radians().abs() > self.travel.as_radians() {
             return self.end(HomingStep::NoStop);
         }
         self.phase = Phase::Approach(from, since);
         HomingStep::Drive(self.velocity)
     }
 
-    fn back_off(&mut self, shaft: ShaftState, from: Position) -> HomingStep {
-        let moved = (shaft.position - from).as_radians();
+    fn back_off(&mut self, position: Position, from: Position) -> HomingStep {
+        let moved = (position - from).as_radians();
         // A stop that yields is no way back.
         let away = if self.velocity.as_rad_per_s() < 0.0 { moved } else { -moved };
         if away >= self.back_off.as_radians() {
@@ -353,12 +344,9 @@ mod tests {
         homing(-2.0).unwrap()
     }
 
-    fn at(radians: f32, rad_per_s: f32, effort: f32) -> Option<ShaftState> {
-        Some(ShaftState {
-            position: Position::from_angle(Angle::from_radians(radians)),
-            velocity: AngularVelocity::from_rad_per_s(rad_per_s),
-            effort,
-        })
+    fn at(radians: f32, rad_per_s: f32, effort: f32) -> Option<Shaft> {
+        let position = Position::from_angle(Angle::from_radians(radians));
+        Some((position, AngularVelocity::from_rad_per_s(rad_per_s), effort))
     }
 
     fn tick(ms: u64) -> Tick {
@@ -387,10 +375,8 @@ mod tests {
         assert_eq!(found, HomingStep::SetPresentPosition(Position::from_turns(4)));
         // From now on the position is told in the new terms.
         let turned = |radians| {
-            at(0.0, 0.0, 0.0).map(|shaft| ShaftState {
-                position: Position::from_turns(4) + Angle::from_radians(radians),
-                ..shaft
-            })
+            let position = Position::from_turns(4) + Angle::from_radians(radians);
+            Some((position, AngularVelocity::ZERO, 0.0))
         };
         assert_eq!(homing.step(turned(0.0), tick(501)), BACK);
         assert_eq!(homing.step(turned(0.05), tick(502)), BACK);

@@ -53,17 +53,18 @@ pub use devices::Devices;
 pub(crate) use devices::ask;
 pub use drive::{AngleDrive, Measured, OneOf, TargetError, VelocityDrive};
 pub use guard::Guard;
-pub use health::{Condition, Conditions, Health, HealthConfig, Reaction, Severity};
-pub(crate) use health::{Journal, Latch, Monitor, Rival, Sample, Traffic, elapsed};
-pub use homing::{HomingStep, ShaftState, StopHoming};
+pub use health::{Condition, Conditions, Health, HealthConfig, Reaction};
+pub(crate) use health::{Journal, Latch, Monitor, Rival, Sample, Severity, Traffic, elapsed};
+pub use homing::{HomingStep, StopHoming};
 pub use link::{Link, Timeouts};
 pub(crate) use link::{age, is_near, take_age};
 pub use load::BusLoad;
 pub(crate) use own::{
-    ControlMode, Form, Goal, Preparation, Questions, Shaft, TimeoutUnits, Told, TorqueLoops,
-    code_from, ingest_eight, inside, lowest_bit, mit_model, models, register_questions, registers,
+    ControlMode, Form, Goal, Inquiry, Preparation, Questions, Settings, Shaft, TimeoutUnits, Told,
+    TorqueLoops, code_from, ingest_eight, inside, lowest_bit, mit_model, models,
+    register_questions, registers,
 };
-pub use own::{Impedance, ImpedanceControl, Inquiry, Order, Own, OwnMotor, Settings, Target};
+pub use own::{Impedance, ImpedanceControl, Order, Own, OwnMotor, Target};
 pub use safety::OPENING;
 pub(crate) use safety::{Ages, DeviceGuard, Hold, MotorGuard, Repeat, Rest};
 pub use watch::Vitals;

@@ -96,8 +96,8 @@ impl Watch {
         vitals: impl Fn() -> Vitals,
         now: Instant,
     ) -> f32 {
-        let Vitals { error, error_code, .. } = vitals();
-        let is_well = error.is_none()
+        let Vitals { has_fault, has_warning, error_code, .. } = vitals();
+        let is_well = !(has_fault || has_warning)
             && error_code == self.error_code
             && !self.rival.is_present()
             && guard.link() == Link::Online
@@ -161,7 +161,7 @@ impl Watch {
     fn read_error(&mut self, latch: &mut Latch, vitals: &Vitals) {
         let before = core::mem::replace(&mut self.error_code, vitals.error_code);
         let changed = before != vitals.error_code;
-        latch.report(vitals.error, changed, self.config);
+        latch.report(vitals.error(), changed, self.config);
     }
 
     pub(crate) fn health(&self, motor: MotorName, guard: &Guard, vitals: &Vitals) -> Health {
@@ -183,18 +183,20 @@ impl Watch {
 ///
 /// # Examples
 /// ```
-/// use drivetrain::motor::{Severity, Vitals};
+/// use drivetrain::motor::Vitals;
 ///
 /// let vitals = Vitals { temperature_c: Some(35), effort: 0.8, speed: 0.01, ..Vitals::default() };
-/// assert_eq!((vitals.error, vitals.current), (None::<Severity>, 0.0));
+/// assert_eq!((vitals.has_fault, vitals.current), (false, 0.0));
 /// ```
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Vitals {
     /// Its temperature in °C. Watched when its [`HealthConfig`] has temperatures.
     pub temperature_c: Option<i16>,
-    /// Severity of the error reported by the ESC.
-    pub error: Option<Severity>,
+    /// Whether the ESC reports a fault: the motor must not be driven.
+    pub has_fault: bool,
+    /// Whether the ESC reports a warning, and continues. During a fault, no warning counts.
+    pub has_warning: bool,
     /// The error code, for the log.
     pub error_code: u8,
     /// The command of the last [`control`](super::OwnMotor::control), as a share; 0 if not known, and then neither stall
@@ -207,11 +209,18 @@ pub struct Vitals {
 }
 
 impl Vitals {
+    pub(crate) const fn error(&self) -> Option<Severity> {
+        match (self.has_fault, self.has_warning) {
+            (true, _) => Some(Severity::Fault),
+            (false, true) => Some(Severity::Warning),
+            (false, false) => None,
+        }
+    }
+
     /// Returns vitals with the first of several codes of faults, or the code of a warning; 0 for none.
     pub(crate) fn of_errors<const N: usize>(faults: [u8; N], warning: u8) -> Self {
-        let fault = faults.into_iter().find(|code| *code > 0).map(|code| (Severity::Fault, code));
-        let warning = (warning > 0).then_some((Severity::Warning, warning));
-        let (error, code) = fault.or(warning).unzip();
-        Self { error, error_code: code.unwrap_or(0), ..Self::default() }
+        let fault = faults.into_iter().find(|code| *code > 0);
+        let (has_fault, has_warning) = (fault.is_some(), fault.is_none() && warning > 0);
+        Self { has_fault, has_warning, error_code: fault.unwrap_or(warning), ..Self::default() }
     }
 }

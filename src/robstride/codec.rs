@@ -2,6 +2,7 @@
 
 use super::{Model, Register};
 use crate::frame::{CanFrame, extended_id};
+use crate::motor::Impedance;
 use crate::motor::{Inquiry, code_from};
 use crate::units::Angle;
 use crate::wire::mit;
@@ -32,7 +33,7 @@ use embedded_can::ExtendedId;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Command {
     /// A spring, a damper and a torque.
-    Operation(mit::Command),
+    Operation(Impedance),
     /// Follows commands from now on.
     Enable,
     /// Gives no torque from now on.

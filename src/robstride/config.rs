@@ -3,9 +3,9 @@
 use super::codec::Command;
 use super::{Model, Register};
 use crate::error::ConfigError;
+use crate::motor::Impedance;
 use crate::motor::{ControlMode, Goal, ImpedanceControl, Order, Preparation, Shaft, Told, inside};
 use crate::units::AngularVelocity;
-use crate::wire::mit;
 
 /// A run mode of the drive. An [`ImpedanceControl`] is also a mode: in the operation mode the drive follows an impedance.
 #[derive(Debug, Clone, Copy)]
@@ -63,7 +63,7 @@ impl Mode {
     /// The command of rest; `None` for a drive that only rests when disabled.
     pub(super) const fn rest(&self) -> Option<Command> {
         match self.control.number {
-            OPERATION => Some(Command::Operation(mit::Command::REST)),
+            OPERATION => Some(Command::Operation(Impedance::FREE)),
             CURRENT => Some(Command::Write(Register::CurrentTarget, 0.0)),
             _ => None,
         }

@@ -33,7 +33,7 @@ mod watch;
 pub use port::{BlockingTx, Nb, NbAbort, Port};
 #[cfg(feature = "queue")]
 pub use queue::{FrameQueue, FrameReceiver, FrameSender};
-pub use statistics::{ErrorCounts, Statistics};
+pub use statistics::Statistics;
 pub use supervision::{AbortPending, EmergencyStop};
 pub use watch::BusCondition;
 

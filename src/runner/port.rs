@@ -466,7 +466,7 @@ mod tests {
             let s = runner.statistics();
             assert_eq!((s.sent, s.evicted_unrelated, s.evicted), (1, 1, 0), "{length}");
             assert_eq!(evicted, handed_back, "{length}");
-            assert_eq!(s.offered, s.sent + s.refused + s.send_errors.total());
+            assert_eq!(s.offered, s.sent + s.refused + s.send_errors());
             assert!(!runner.is_bus_down());
         }
     }

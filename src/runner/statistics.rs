@@ -8,7 +8,7 @@ use embedded_can::ErrorKind;
 /// Counters of a runner since its creation; every counter saturates.
 ///
 /// Received frames add up: `received = taken + unrelated + malformed`. Offered frames add up:
-/// `offered = sent + refused + send_errors.total()`.
+/// `offered = sent + refused + send_errors()`.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -21,16 +21,14 @@ pub struct Statistics {
     pub unrelated: u32,
     /// Frames with a motor's id but not in the form of its feedback; not used.
     pub malformed: u32,
-    /// Errors of the driver when asked for a frame.
-    pub receive_errors: ErrorCounts,
+    pub(super) receive_errors: ErrorCounts,
     /// Frames offered to the driver; refused offers of a poll do not count.
     pub offered: u32,
     /// Frames taken by the driver.
     pub sent: u32,
     /// Frames without a place in the driver in a tick. Kept, and offered again.
     pub refused: u32,
-    /// Errors of the driver when offered a frame. The frame is kept as well.
-    pub send_errors: ErrorCounts,
+    pub(super) send_errors: ErrorCounts,
     /// Own frames given back by the driver, for frames of higher priority or because they were called back. Kept as well.
     pub evicted: u32,
     /// Frames of others given back by the driver for ours. Handed back, unless they are not classic CAN frames of at most 8
@@ -55,21 +53,21 @@ pub struct Statistics {
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct ErrorCounts {
+pub(super) struct ErrorCounts {
     /// The receive buffer overflowed.
-    pub overrun: u32,
+    overrun: u32,
     /// A bit on the bus differed from the bit sent.
-    pub bit: u32,
+    bit: u32,
     /// The bit stuffing was wrong.
-    pub stuff: u32,
+    stuff: u32,
     /// The checksum was wrong.
-    pub crc: u32,
+    crc: u32,
     /// The frame had a wrong form.
-    pub form: u32,
+    form: u32,
     /// Nobody acknowledged the frame.
-    pub acknowledge: u32,
+    acknowledge: u32,
     /// Any other error, bus-off included: `embedded-can` has no kind for these.
-    pub other: u32,
+    other: u32,
 }
 
 impl Statistics {
@@ -92,6 +90,42 @@ impl Statistics {
         clock_standstills: 0,
         clock_reversals: 0,
     };
+
+    /// Returns the number of errors of the driver when asked for a frame.
+    #[must_use]
+    pub const fn receive_errors(&self) -> u32 {
+        self.receive_errors.total()
+    }
+
+    /// Returns the number of errors of one kind when the driver was asked for a frame.
+    ///
+    /// [`ErrorKind::Other`] counts any kind without a name in `embedded-can`, bus-off included.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::runner::Statistics;
+    /// use embedded_can::ErrorKind;
+    ///
+    /// let none = Statistics::default();
+    /// assert_eq!((none.receive_errors(), none.receive_errors_of(ErrorKind::Crc)), (0, 0));
+    /// ```
+    #[must_use]
+    pub const fn receive_errors_of(&self, kind: ErrorKind) -> u32 {
+        self.receive_errors.of(kind)
+    }
+
+    /// Returns the number of errors of the driver when offered a frame. The frame is kept as well.
+    #[must_use]
+    pub const fn send_errors(&self) -> u32 {
+        self.send_errors.total()
+    }
+
+    /// Returns the number of errors of one kind when the driver was offered a frame; kinds as in
+    /// [`receive_errors_of`](Self::receive_errors_of).
+    #[must_use]
+    pub const fn send_errors_of(&self, kind: ErrorKind) -> u32 {
+        self.send_errors.of(kind)
+    }
 
     /// Counts the received frames of one call; returns the number of frames taken.
     #[inline(always)]
@@ -130,9 +164,19 @@ impl ErrorCounts {
         });
     }
 
-    /// Returns the sum over all kinds.
-    #[must_use]
-    pub const fn total(&self) -> u32 {
+    const fn of(&self, kind: ErrorKind) -> u32 {
+        match kind {
+            ErrorKind::Overrun => self.overrun,
+            ErrorKind::Bit => self.bit,
+            ErrorKind::Stuff => self.stuff,
+            ErrorKind::Crc => self.crc,
+            ErrorKind::Form => self.form,
+            ErrorKind::Acknowledge => self.acknowledge,
+            _ => self.other,
+        }
+    }
+
+    const fn total(&self) -> u32 {
         self.overrun
             .saturating_add(self.bit)
             .saturating_add(self.stuff)

@@ -1,5 +1,5 @@
-use super::LoaderFeedback;
 use crate::encoder::Position;
+use crate::units::AngularVelocity;
 use core::f32::consts::TAU;
 
 /// Share of a chamber's angle below which the shot counts.
@@ -137,15 +137,13 @@ impl Loader {
     /// Turns to the due chamber. Returns the motion of the loader, and the number of shots counted.
     pub(super) fn step(
         &mut self,
-        feedback: &LoaderFeedback,
+        (position, velocity): (Position, AngularVelocity),
         (feed, gain_per_s, jam_s): (f32, f32, f32),
         dt_s: f32,
     ) -> (Feed, u32) {
         let pitch = self.pitch_rad();
         let mut counted = 0;
-        while self.is_feeding()
-            && self.way_rad(feedback.position, self.ahead(1)) <= COUNTED_SHARE * pitch
-        {
+        while self.is_feeding() && self.way_rad(position, self.ahead(1)) <= COUNTED_SHARE * pitch {
             self.counted = self.ahead(1);
             self.waiting -= 1;
             counted += 1;
@@ -155,7 +153,7 @@ impl Loader {
             self.stood_s = 0.0;
             return (Feed::Idle, counted);
         }
-        let way = self.way_rad(feedback.position, self.ahead(self.waiting));
+        let way = self.way_rad(position, self.ahead(self.waiting));
         if let Some((left_s, from)) = self.back {
             let left_s = left_s - dt_s;
             let is_done = left_s <= 0.0 || way - from >= BACK_SHARE * pitch;
@@ -163,7 +161,7 @@ impl Loader {
             return (Feed::Back(-feed), counted);
         }
         let target = (gain_per_s * way).min(feed);
-        let stands = feedback.velocity.as_rad_per_s() < STANDS_SHARE * target;
+        let stands = velocity.as_rad_per_s() < STANDS_SHARE * target;
         self.stood_s = if stands { self.stood_s + dt_s } else { 0.0 };
         if self.stood_s < jam_s {
             return (Feed::Forward(target), counted);
@@ -218,11 +216,9 @@ mod tests {
         assert_eq!(loader.ahead(8).within, 1);
     }
 
-    fn at(degrees: f32, rad_per_s: f32) -> LoaderFeedback {
-        LoaderFeedback {
-            position: Position::from_angle(Angle::from_degrees(degrees)),
-            velocity: AngularVelocity::from_rad_per_s(rad_per_s),
-        }
+    fn at(degrees: f32, rad_per_s: f32) -> (Position, AngularVelocity) {
+        let position = Position::from_angle(Angle::from_degrees(degrees));
+        (position, AngularVelocity::from_rad_per_s(rad_per_s))
     }
 
     const RATES: (f32, f32, f32) = (5.0, 20.0, 0.1);
@@ -230,21 +226,21 @@ mod tests {
     #[test]
     fn a_shot_counts_at_nine_tenths_of_its_way_and_the_next_may_follow_at_half() {
         let mut loader = Loader::new(8, 3); // 45 degrees
-        loader.start(at(10.0, 0.0).position);
-        assert_eq!(loader.step(&at(10.0, 0.0), RATES, 0.001), (Feed::Idle, 0));
+        loader.start(at(10.0, 0.0).0);
+        assert_eq!(loader.step(at(10.0, 0.0), RATES, 0.001), (Feed::Idle, 0));
         loader.admit();
-        assert!(!loader.takes_next(at(30.0, 5.0).position));
-        assert!(loader.takes_next(at(33.0, 5.0).position));
-        assert_eq!(loader.step(&at(50.0, 5.0), RATES, 0.001).1, 0);
-        assert_eq!(loader.step(&at(51.0, 5.0), RATES, 0.001), (Feed::Idle, 1));
+        assert!(!loader.takes_next(at(30.0, 5.0).0));
+        assert!(loader.takes_next(at(33.0, 5.0).0));
+        assert_eq!(loader.step(at(50.0, 5.0), RATES, 0.001).1, 0);
+        assert_eq!(loader.step(at(51.0, 5.0), RATES, 0.001), (Feed::Idle, 1));
         loader.admit();
-        assert_eq!(loader.step(&at(51.0, 0.0), RATES, 0.001), (Feed::Forward(5.0), 0));
+        assert_eq!(loader.step(at(51.0, 0.0), RATES, 0.001), (Feed::Forward(5.0), 0));
     }
 
     #[test]
     fn a_loader_that_was_turned_by_hand_goes_on_to_the_next_chamber_of_its_grid() {
         let mut loader = Loader::new(8, 3);
-        loader.start(at(0.0, 0.0).position);
+        loader.start(at(0.0, 0.0).0);
         for (degrees, way) in [
             (0.0, 45.0),
             (20.0, 25.0),
@@ -254,7 +250,7 @@ mod tests {
             (-10.0, 10.0),
             (-200.0, 20.0),
         ] {
-            let position = at(degrees, 0.0).position;
+            let position = at(degrees, 0.0).0;
             loader.start(position);
             let next = loader.way_rad(position, loader.ahead(1)).to_degrees();
             assert!((next - way).abs() < 1e-3, "{degrees}: {next}");

@@ -1,10 +1,8 @@
 use super::loader::{Feed, Loader};
-use super::{
-    LoaderFeedback, ShooterConfig, ShooterFault, ShooterFeedback, ShooterOrder, ShooterState,
-    ShooterTargets,
-};
+use super::{REST, ShooterConfig, ShooterFeedback, ShooterOrder, ShooterState};
+use crate::encoder::Position;
 use crate::error::ConfigError;
-use crate::time::Tick;
+use crate::time::{Duration, Tick};
 use crate::units::AngularVelocity;
 use crate::wire::referee::BarrelHeat;
 
@@ -21,25 +19,24 @@ const LONGEST_STEP_S: f32 = 0.1;
 /// One shot, with motors that follow at once:
 /// ```
 /// use drivetrain::encoder::Position;
-/// use drivetrain::shooter::{LoaderFeedback, ShooterOrder, Shooter, ShooterConfig, ShooterFeedback};
+/// use drivetrain::shooter::{ShooterOrder, Shooter, ShooterFeedback};
 /// use drivetrain::time::{Instant, Tick};
 /// use drivetrain::units::{Angle, AngularVelocity};
 /// use drivetrain::wire::referee::BarrelHeat;
 ///
-/// let config = ShooterConfig::new(AngularVelocity::from_rpm(6_000.0), 8, 10.0);
-/// let mut shooter = Shooter::new(config)?;
+/// let mut shooter = Shooter::new(AngularVelocity::from_rpm(6_000.0), 8, 10.0)?;
 /// let (mut wheels, mut velocity, mut angle_rad) = (AngularVelocity::ZERO, AngularVelocity::ZERO, 0.0);
 /// for ms in 1..=500 {
 ///     let position = Position::from_angle(Angle::from_radians(angle_rad));
 ///     let feedback = ShooterFeedback {
 ///         is_armed: true,
 ///         wheels: [Some(wheels); 2],
-///         loader: Some(LoaderFeedback { position, velocity }),
+///         loader: Some((position, velocity)),
 ///         heat: Some(BarrelHeat { heat: 0, limit: 200, cooling_per_s: 10 }), // `Referee::heat_17mm`
 ///     };
 ///     let order = if ms < 100 { ShooterOrder::Spin } else { ShooterOrder::Fire(1) };
-///     let targets = shooter.update(order, &feedback, Tick::new(Instant::from_micros(1_000 * ms), 0.001));
-///     (wheels, velocity) = (targets.wheels, targets.loader);
+///     let tick = Tick::new(Instant::from_micros(1_000 * ms), 0.001);
+///     (wheels, velocity) = shooter.update(order, &feedback, tick);
 ///     angle_rad += 0.001 * velocity.as_rad_per_s();
 /// }
 /// assert_eq!(shooter.shots(), 1); // however long the trigger is held
@@ -63,28 +60,119 @@ pub struct Shooter {
 }
 
 impl Shooter {
-    /// Takes a configuration.
+    /// Takes the speed of the friction wheels, the number of chambers in a turn of the loader's output shaft, and the shots in 1 s.
+    ///
+    /// | parameter | default |
+    /// |---|---|
+    /// | tolerance of the wheels | 1 % of their speed |
+    /// | heat of a shot | 10, a ball of 17 mm; 100 for 42 mm |
+    /// | reserve below the heat limit | the heat of one shot |
+    /// | a loader that stands is jammed after | 100 ms |
+    /// | tries to clear a jam | 3 |
+    /// | gain from way to speed of the loader | 20 rad/s per rad |
+    /// | heat limit without the referee system | none: nothing is shot |
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::shooter::Shooter;
+    /// use drivetrain::units::AngularVelocity;
+    ///
+    /// let shooter = Shooter::new(AngularVelocity::from_rpm(6_000.0), 8, 10.0)?.with_tries(5);
+    /// assert!((shooter.feed_velocity().as_rad_per_s() - 7.854).abs() < 1e-3); // 10 of 8 chambers in 1 s
+    /// let error = shooter.with_tolerance(0.0).unwrap_err();
+    /// assert_eq!(error.to_string(), "tolerance: must be more than zero, and finite");
+    /// # Ok::<(), drivetrain::error::ConfigError>(())
+    /// ```
     ///
     /// # Errors
-    /// Names the unusable parameter.
-    pub const fn new(config: ShooterConfig) -> Result<Self, ConfigError> {
-        match config.validate() {
-            Ok(()) => Ok(Self {
-                config,
-                state: ShooterState::Rest,
-                loader: Loader::new(config.chambers, config.tries),
-                heat: Heat::new(),
-                ordered: 0,
-                is_released: false,
-                settled_s: 0.0,
-                spinning_up_s: 0.0,
-                shots: 0,
-            }),
+    /// Names `wheels`, `chambers` or `shots_per_s` when it is not above zero and finite; chambers and shots are at most 64.
+    pub const fn new(
+        wheels: AngularVelocity,
+        chambers: u8,
+        shots_per_s: f32,
+    ) -> Result<Self, ConfigError> {
+        Self {
+            config: ShooterConfig::new(wheels, chambers, shots_per_s),
+            state: ShooterState::Rest,
+            loader: Loader::new(1, 0),
+            heat: Heat::new(),
+            ordered: 0,
+            is_released: false,
+            settled_s: 0.0,
+            spinning_up_s: 0.0,
+            shots: 0,
+        }
+        .checked()
+    }
+
+    const fn checked(self) -> Result<Self, ConfigError> {
+        match self.config.validate() {
+            Ok(()) => {
+                let loader = Loader::new(self.config.chambers, self.config.tries);
+                Ok(Self { loader, ..self })
+            }
             Err(error) => Err(error),
         }
     }
 
-    /// Takes order and feedback of a tick, and returns the target speeds of the motors.
+    /// Sets the largest error of the wheels, as a share of their speed, at which a shot is released.
+    ///
+    /// # Errors
+    /// `tolerance` is not above zero and finite.
+    pub const fn with_tolerance(mut self, share: f32) -> Result<Self, ConfigError> {
+        self.config.tolerance = share;
+        self.checked()
+    }
+
+    /// Sets the heat of a shot and the heat to keep free below the limit.
+    #[must_use]
+    pub const fn with_heat(mut self, of_shot: u16, reserve: u16) -> Self {
+        (self.config.heat_of_shot, self.config.reserve) = (of_shot, Some(reserve));
+        self
+    }
+
+    /// Sets the time after which a driven loader at standstill counts as jammed.
+    ///
+    /// # Errors
+    /// `jam_after` is not above zero.
+    pub const fn with_jam_after(mut self, time: Duration) -> Result<Self, ConfigError> {
+        self.config.jam_s = time.as_secs_f32();
+        self.checked()
+    }
+
+    /// Sets the number of attempts to clear a jam of one shot. After the last, the shooter stops with
+    /// [`Jammed`](ShooterState::Jammed).
+    #[must_use]
+    pub const fn with_tries(mut self, tries: u8) -> Self {
+        self.config.tries = tries;
+        self.loader = Loader::new(self.config.chambers, tries);
+        self
+    }
+
+    /// Sets the gain of the loader: speed per distance to its goal, in rad/s per rad.
+    ///
+    /// # Errors
+    /// `loader_gain` is not above zero and finite.
+    pub const fn with_loader_gain(mut self, per_s: f32) -> Result<Self, ConfigError> {
+        self.config.gain_per_s = per_s;
+        self.checked()
+    }
+
+    /// Sets limit and cooling for practice, while the referee system is silent. The field `heat` is ignored.
+    #[must_use]
+    pub const fn with_heat_without_referee(mut self, heat: BarrelHeat) -> Self {
+        self.config.without_referee = Some(heat);
+        self
+    }
+
+    /// Returns the feeding speed of the loader.
+    #[must_use]
+    pub const fn feed_velocity(&self) -> AngularVelocity {
+        self.config.feed_velocity()
+    }
+
+    /// Takes order and feedback of a tick, and returns the target speeds: of both friction wheels, positive in the shooting direction, and
+    /// of the loader, positive in the feeding direction.
     ///
     /// While the robot is disarmed, all motors stand and no shot waits. If the time step is not a positive number up to 0.1 s, all motors
     /// stand for that tick, and nothing else changes.
@@ -95,10 +183,10 @@ impl Shooter {
         order: ShooterOrder,
         feedback: &ShooterFeedback,
         tick: Tick,
-    ) -> ShooterTargets {
+    ) -> (AngularVelocity, AngularVelocity) {
         let dt_s = tick.dt_s();
         if !(dt_s > 0.0 && dt_s <= LONGEST_STEP_S) {
-            return ShooterTargets::REST;
+            return REST;
         }
         self.heat.update(feedback.heat, self.config.without_referee, dt_s);
         if !feedback.is_armed {
@@ -110,16 +198,16 @@ impl Shooter {
         if order == ShooterOrder::Rest {
             return self.rest();
         }
-        if let ShooterState::Fault(_) = self.state {
-            return ShooterTargets::REST;
+        if self.state.is_fault() {
+            return REST;
         }
         let (wheels, loader) = match (feedback.wheels, feedback.loader) {
             ([Some(left), Some(right)], Some(loader)) => ([left, right], loader),
-            ([Some(_), Some(_)], None) => return self.fail(ShooterFault::LoaderLost),
-            _ => return self.fail(ShooterFault::WheelLost),
+            ([Some(_), Some(_)], None) => return self.fail(ShooterState::LoaderLost),
+            _ => return self.fail(ShooterState::WheelLost),
         };
         if self.state == ShooterState::Rest {
-            self.loader.start(loader.position);
+            self.loader.start(loader.0);
             (self.settled_s, self.spinning_up_s) = (0.0, 0.0);
         }
         match order {
@@ -133,12 +221,12 @@ impl Shooter {
             Ok(is_settled) => is_settled,
             Err(fault) => return self.fail(fault),
         };
-        let is_kept_waiting = self.let_go(is_settled, &loader);
-        self.feed(&loader, is_settled, is_kept_waiting, dt_s)
+        let is_kept_waiting = self.let_go(is_settled, loader.0);
+        self.feed(loader, is_settled, is_kept_waiting, dt_s)
     }
 
     /// Tells whether the wheels have been at their speed for the settling time.
-    fn settle(&mut self, wheels: [AngularVelocity; 2], dt_s: f32) -> Result<bool, ShooterFault> {
+    fn settle(&mut self, wheels: [AngularVelocity; 2], dt_s: f32) -> Result<bool, ShooterState> {
         let target = self.config.wheels.as_rad_per_s();
         let allowed = self.config.tolerance * target;
         let are_within =
@@ -153,12 +241,12 @@ impl Shooter {
             self.settled_s = 0.0;
         }
         self.spinning_up_s += dt_s;
-        if self.spinning_up_s > SPIN_UP_S { Err(ShooterFault::WheelSlow) } else { Ok(false) }
+        if self.spinning_up_s > SPIN_UP_S { Err(ShooterState::WheelSlow) } else { Ok(false) }
     }
 
     /// Releases the next shot of the burst if wheels, loader and heat allow. Returns whether a shot waits for the heat alone.
-    fn let_go(&mut self, is_settled: bool, loader: &LoaderFeedback) -> bool {
-        if self.ordered == 0 || !is_settled || !self.loader.takes_next(loader.position) {
+    fn let_go(&mut self, is_settled: bool, loader: Position) -> bool {
+        if self.ordered == 0 || !is_settled || !self.loader.takes_next(loader) {
             return false;
         }
         let of_shot = self.config.heat_of_shot;
@@ -172,17 +260,17 @@ impl Shooter {
 
     fn feed(
         &mut self,
-        loader: &LoaderFeedback,
+        loader: (Position, AngularVelocity),
         is_settled: bool,
         is_kept_waiting: bool,
         dt_s: f32,
-    ) -> ShooterTargets {
+    ) -> (AngularVelocity, AngularVelocity) {
         let feed = self.config.feed_velocity().as_rad_per_s();
         let rates = (feed, self.config.gain_per_s, self.config.jam_s);
         let (step, counted) = self.loader.step(loader, rates, dt_s);
         self.shots = self.shots.saturating_add(counted);
         let (state, loader) = match step {
-            Feed::Jammed => return self.fail(ShooterFault::Jammed),
+            Feed::Jammed => return self.fail(ShooterState::Jammed),
             Feed::Forward(velocity) => (ShooterState::Feeding, velocity),
             Feed::Back(velocity) => (ShooterState::Clearing, velocity),
             Feed::Idle if !is_settled => (ShooterState::SpinningUp, 0.0),
@@ -190,23 +278,20 @@ impl Shooter {
             Feed::Idle => (ShooterState::Ready, 0.0),
         };
         self.state = state;
-        ShooterTargets {
-            wheels: self.config.wheels,
-            loader: AngularVelocity::from_rad_per_s(loader),
-        }
+        (self.config.wheels, AngularVelocity::from_rad_per_s(loader))
     }
 
-    fn rest(&mut self) -> ShooterTargets {
+    fn rest(&mut self) -> (AngularVelocity, AngularVelocity) {
         self.state = ShooterState::Rest;
         self.ordered = 0;
         self.loader.stop();
-        ShooterTargets::REST
+        REST
     }
 
-    fn fail(&mut self, fault: ShooterFault) -> ShooterTargets {
+    fn fail(&mut self, fault: ShooterState) -> (AngularVelocity, AngularVelocity) {
         self.rest();
-        self.state = ShooterState::Fault(fault);
-        ShooterTargets::REST
+        self.state = fault;
+        REST
     }
 
     /// Returns the state of the shooter.

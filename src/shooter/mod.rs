@@ -6,7 +6,7 @@
 //!  referee ── heat ─┘                                     └── speed of the loader
 //! ```
 //!
-//! The module is independent of bus and motor: from feedback to target speeds ([`ShooterTargets`]). A motor of any family fits, if its
+//! The module is independent of bus and motor: from feedback to target speeds. A motor of any family fits, if its
 //! drive has a velocity loop and a position of the shaft over many turns. The speed is that of the shaft: friction wheels on M3508 without
 //! their gearbox are attached with [`with_gear(GearRatio::DIRECT)`](crate::dji::Config::with_gear), some 6000 rpm; the example `shooter`
 //! turns geared wheels at 400 rpm.
@@ -19,23 +19,23 @@
 //! | [`Feeding`](ShooterState::Feeding) | speed | turns to the next chamber | the shot is counted, or the loader stands for 100 ms |
 //! | [`Clearing`](ShooterState::Clearing) | speed | turns half a chamber back | the way back is done, or 200 ms |
 //! | [`Cooling`](ShooterState::Cooling) | speed | 0 | the next shot fits below the heat limit |
-//! | [`Fault`](ShooterState::Fault) | 0 | 0 | the order is `Rest`, or the robot is disarmed |
+//! | a fault: [`WheelLost`](ShooterState::WheelLost), [`WheelSlow`](ShooterState::WheelSlow), [`LoaderLost`](ShooterState::LoaderLost), [`Jammed`](ShooterState::Jammed) | 0 | 0 | the order is `Rest`, or the robot is disarmed |
 //!
 //! The shooter releases a shot when the wheels are within 1 % and the heat of the shot fits below the limit. The heat counts from then on,
 //! before the referee system reports it: a burst then does not exceed the limit during the 100 ms between two reports.
 //!
 //! ```
-//! use drivetrain::shooter::{ShooterOrder, Shooter, ShooterConfig, ShooterFeedback, ShooterState};
+//! use drivetrain::shooter::{ShooterOrder, Shooter, ShooterFeedback, ShooterState};
 //! use drivetrain::time::{Instant, Tick};
 //! use drivetrain::units::AngularVelocity;
 //!
 //! let wheels = AngularVelocity::from_rpm(6_000.0);
-//! let mut shooter = Shooter::new(ShooterConfig::new(wheels, 8, 10.0))?; // 8 chambers, 10 shots in 1 s
+//! let mut shooter = Shooter::new(wheels, 8, 10.0)?; // 8 chambers, 10 shots in 1 s
 //! let tick = Tick::new(Instant::from_micros(1_000), 0.001);
 //!
 //! let disarmed = ShooterFeedback::default();
-//! let targets = shooter.update(ShooterOrder::Fire(1), &disarmed, tick);
-//! assert_eq!((targets.wheels.as_rpm(), targets.loader.as_rpm()), (0.0, 0.0));
+//! let (wheels, loader) = shooter.update(ShooterOrder::Fire(1), &disarmed, tick);
+//! assert_eq!((wheels.as_rpm(), loader.as_rpm()), (0.0, 0.0));
 //! assert_eq!(shooter.state(), ShooterState::Rest);
 //! # Ok::<(), drivetrain::error::ConfigError>(())
 //! ```
@@ -50,7 +50,6 @@ pub use machine::Shooter;
 
 use crate::encoder::Position;
 use crate::error::ConfigError;
-use crate::time::Duration;
 use crate::units::AngularVelocity;
 use crate::wire::referee::BarrelHeat;
 
@@ -89,45 +88,47 @@ pub enum ShooterState {
     Clearing,
     /// A shot waits until the barrel is cool enough, or until its heat is known.
     Cooling,
-    /// All motors stand until the order is [`ShooterOrder::Rest`], or the robot is disarmed.
-    Fault(ShooterFault),
-}
-
-/// Cause of a stop.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-#[non_exhaustive]
-pub enum ShooterFault {
-    /// A friction wheel has no fresh feedback.
+    /// Fault: a friction wheel has no fresh feedback.
     WheelLost,
-    /// A friction wheel is not within the tolerance after 3 s of spinning up.
+    /// Fault: a friction wheel is not within the tolerance after 3 s of spinning up.
     WheelSlow,
-    /// The loader has no fresh feedback.
+    /// Fault: the loader has no fresh feedback.
     LoaderLost,
-    /// The loader stood again after the last attempt to clear it.
+    /// Fault: the loader stood again after the last attempt to clear it.
     Jammed,
 }
 
-impl core::fmt::Display for ShooterFault {
+impl ShooterState {
+    /// Returns whether the state is a fault: all motors stand until the order is [`ShooterOrder::Rest`], or the robot is disarmed.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::shooter::ShooterState;
+    ///
+    /// assert!(ShooterState::Jammed.is_fault() && !ShooterState::Clearing.is_fault());
+    /// assert_eq!(ShooterState::Jammed.to_string(), "the loader is jammed: clear it, then order rest");
+    /// ```
+    #[must_use]
+    pub const fn is_fault(self) -> bool {
+        matches!(self, Self::WheelLost | Self::WheelSlow | Self::LoaderLost | Self::Jammed)
+    }
+}
+
+impl core::fmt::Display for ShooterState {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
+            Self::Rest => "all motors stand",
+            Self::SpinningUp => "the friction wheels are not at their speed",
+            Self::Ready => "the friction wheels are at their speed",
+            Self::Feeding => "a shot moves through the loader",
+            Self::Clearing => "the loader turns back after a jam",
+            Self::Cooling => "a shot waits for the heat of the barrel",
             Self::WheelLost => "a friction wheel has no fresh feedback",
             Self::WheelSlow => "a friction wheel did not reach its speed in 3 s",
             Self::LoaderLost => "the loader has no fresh feedback",
             Self::Jammed => "the loader is jammed: clear it, then order rest",
         })
     }
-}
-
-/// Feedback of the loader's motor, at its output shaft.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct LoaderFeedback {
-    /// Turns and angle, from any zero; positive in the feeding direction.
-    pub position: Position,
-    /// Speed, positive in the feeding direction.
-    pub velocity: AngularVelocity,
 }
 
 /// Feedback for one tick of a shooter. The default is a disarmed robot without feedback.
@@ -138,56 +139,23 @@ pub struct ShooterFeedback {
     pub is_armed: bool,
     /// Speeds of the friction wheels, positive in the shooting direction; `None` without fresh feedback.
     pub wheels: [Option<AngularVelocity>; 2],
-    /// The loader; `None` without fresh feedback.
-    pub loader: Option<LoaderFeedback>,
+    /// Position and velocity of the loader's output shaft, positive in the feeding direction, the position from any zero; `None` without
+    /// fresh feedback.
+    pub loader: Option<(Position, AngularVelocity)>,
     /// Heat of the barrel; `None` while the referee system is silent.
     pub heat: Option<BarrelHeat>,
 }
 
-/// Target speeds of a shooter's motors.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct ShooterTargets {
-    /// Both friction wheels, positive in the shooting direction.
-    pub wheels: AngularVelocity,
-    /// The loader, positive in the feeding direction.
-    pub loader: AngularVelocity,
-}
-
-impl ShooterTargets {
-    /// All motors stand.
-    pub const REST: Self = Self { wheels: AngularVelocity::ZERO, loader: AngularVelocity::ZERO };
-}
+/// Targets with which all motors stand.
+const REST: (AngularVelocity, AngularVelocity) = (AngularVelocity::ZERO, AngularVelocity::ZERO);
 
 /// Largest number of chambers of a loader, and of shots in 1 s.
 const MOST: f32 = 64.0;
 
 /// Geometry and limits of a shooter.
-///
-/// | parameter | default |
-/// |---|---|
-/// | tolerance of the wheels | 1 % of their speed |
-/// | heat of a shot | 10, a ball of 17 mm; 100 for 42 mm |
-/// | reserve below the heat limit | the heat of one shot |
-/// | a loader that stands is jammed after | 100 ms |
-/// | tries to clear a jam | 3 |
-/// | gain from way to speed of the loader | 20 rad/s per rad |
-/// | heat limit without the referee system | none: nothing is shot |
-///
-/// # Examples
-/// ```
-/// use drivetrain::shooter::{Shooter, ShooterConfig};
-/// use drivetrain::units::AngularVelocity;
-///
-/// let wheels = AngularVelocity::from_rpm(6_000.0);
-/// let config = ShooterConfig::new(wheels, 8, 10.0).with_tries(5);
-/// assert!((config.feed_velocity().as_rad_per_s() - 7.854).abs() < 1e-3); // 10 of 8 chambers in 1 s
-/// let error = Shooter::new(config.with_tolerance(0.0)).unwrap_err();
-/// assert_eq!(error.to_string(), "tolerance: must be more than zero, and finite");
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct ShooterConfig {
+struct ShooterConfig {
     wheels: AngularVelocity,
     chambers: u8,
     shots_per_s: f32,
@@ -201,9 +169,7 @@ pub struct ShooterConfig {
 }
 
 impl ShooterConfig {
-    /// Takes the speed of the friction wheels, the number of chambers in a turn of the loader's output shaft, and the shots in 1 s.
-    #[must_use]
-    pub const fn new(wheels: AngularVelocity, chambers: u8, shots_per_s: f32) -> Self {
+    const fn new(wheels: AngularVelocity, chambers: u8, shots_per_s: f32) -> Self {
         Self {
             wheels,
             chambers,
@@ -218,46 +184,7 @@ impl ShooterConfig {
         }
     }
 
-    /// Sets the largest error of the wheels, as a share of their speed, at which a shot is released.
-    #[must_use]
-    pub const fn with_tolerance(self, share: f32) -> Self {
-        Self { tolerance: share, ..self }
-    }
-
-    /// Sets the heat of a shot and the heat to keep free below the limit.
-    #[must_use]
-    pub const fn with_heat(self, of_shot: u16, reserve: u16) -> Self {
-        Self { heat_of_shot: of_shot, reserve: Some(reserve), ..self }
-    }
-
-    /// Sets the time after which a driven loader at standstill counts as jammed.
-    #[must_use]
-    pub const fn with_jam_after(self, time: Duration) -> Self {
-        Self { jam_s: time.as_secs_f32(), ..self }
-    }
-
-    /// Sets the number of attempts to clear a jam of one shot. After the last, the shooter stops with
-    /// [`Jammed`](ShooterFault::Jammed).
-    #[must_use]
-    pub const fn with_tries(self, tries: u8) -> Self {
-        Self { tries, ..self }
-    }
-
-    /// Sets the gain of the loader: speed per distance to its goal, in rad/s per rad.
-    #[must_use]
-    pub const fn with_loader_gain(self, per_s: f32) -> Self {
-        Self { gain_per_s: per_s, ..self }
-    }
-
-    /// Sets limit and cooling for practice, while the referee system is silent. The field `heat` is ignored.
-    #[must_use]
-    pub const fn with_heat_without_referee(self, heat: BarrelHeat) -> Self {
-        Self { without_referee: Some(heat), ..self }
-    }
-
-    /// Returns the feeding speed of the loader.
-    #[must_use]
-    pub const fn feed_velocity(&self) -> AngularVelocity {
+    const fn feed_velocity(&self) -> AngularVelocity {
         AngularVelocity::from_rad_per_s(self.shots_per_s * self.pitch_rad())
     }
 

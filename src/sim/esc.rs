@@ -52,7 +52,7 @@ impl Esc {
     /// Takes its place in the world: `index` picks the stream of chance. `None` when the model has no such id.
     pub(crate) fn new(config: MotorConfig, seed: u64, index: u64, now_ns: u64) -> Option<Self> {
         let facts = config.model.facts();
-        let (command_frame, slot) = facts.place(config.id)?;
+        let (command_id, slot) = facts.place(config.id)?;
         let mut random = Random::new(seed, 2 * index + 1);
         let angle = random.below(8192);
         let period_ns = config.period.as_micros() * 1_000;
@@ -65,7 +65,7 @@ impl Esc {
             config,
             facts,
             command_raw: if config.legacy_full_scale { 30_000 } else { facts.command_raw },
-            command_id: command_frame.id(),
+            command_id,
             slot,
             rotor: Rotor::new(&config, angle),
             mailboxes: Mailboxes::new(),

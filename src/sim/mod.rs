@@ -98,7 +98,6 @@ pub use can::{INTERMISSION_BITS, frame_bits, nominal_bits, worst_case_bits};
 pub use chassis::{ChassisConfig, ChassisState, Wheel};
 pub use drive::{
     DamiaoDrive, Drive, DriveShaft, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive,
-    VescMotor,
 };
 pub use fault::{Fault, SimError};
 pub use joint::JointConfig;

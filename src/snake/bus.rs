@@ -1,7 +1,7 @@
 use super::model::{Budget, Counters, IDS, SLOTS, count, limited, name};
 use super::schedule::{self, Answers};
 use super::slot::{Slot, health};
-use super::{AttachError, Command, Config, Joint, Joints, Reply, State};
+use super::{AttachError, Command, Config, Joint, Joints, Register, State};
 use crate::frame::CanFrame;
 use crate::motor::{BusLoad, DeviceGuard, Hold, Ingest, Link, Malformed, MotorName, Timeouts};
 use crate::time::{Duration, Instant, Tick, TimeStep};
@@ -130,9 +130,9 @@ impl Joints {
         let index = frame.header().wrapping_sub(1) as usize;
         let Some(slot) = self.slots.get_mut(index) else { return Ingest::Unrelated };
         let counters = &mut self.counters;
-        let reply = Reply::decode(frame.data());
-        if let Some(reply) = reply {
-            self.answers.take(index, reply.register());
+        let reply = Register::from_reply(frame.data());
+        if let Some((register, _)) = reply {
+            self.answers.take(index, register);
         }
         if slot.id.is_none() {
             count(&mut counters.unattached);

@@ -73,59 +73,33 @@ impl Command {
 
 const REPLY: u8 = 0x04;
 
-/// Value of a register, as reported by a joint.
-///
-/// # Examples
-/// ```
-/// use drivetrain::snake::{Register, Reply};
-///
-/// let reply = Reply::decode(&[0x04, 0x07, 0xFF, 0xFF, 0xFF, 0xFF]).ok_or("no reply")?;
-/// assert_eq!((reply.register(), reply.value()), (Register::ActualPosition, -1));
-/// # Ok::<(), &str>(())
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Reply {
-    register: Register,
-    value: i32,
-}
-
-impl Reply {
-    /// Takes a register and its value.
+impl Register {
+    /// Takes the data of a reply, and returns the register and its value as on the wire; `None` unless the data has 6 bytes, begins with 4
+    /// and names a register.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::snake::Register;
+    ///
+    /// let reply = Register::from_reply(&[0x04, 0x07, 0xFF, 0xFF, 0xFF, 0xFF]);
+    /// assert_eq!(reply, Some((Register::ActualPosition, -1)));
+    /// assert_eq!(Register::ActualPosition.reply(-1), [0x04, 0x07, 0xFF, 0xFF, 0xFF, 0xFF]);
+    /// ```
     #[must_use]
-    pub const fn new(register: Register, value: i32) -> Self {
-        Self { register, value }
-    }
-
-    /// Takes the data of a reply; `None` unless the data has 6 bytes, begins with 4 and names a register.
-    #[must_use]
-    pub fn decode(data: &[u8]) -> Option<Self> {
+    pub fn from_reply(data: &[u8]) -> Option<(Self, i32)> {
         match *data {
             [REPLY, register, a, b, c, d] => {
-                Some(Self::new(Register::from_raw(register)?, i32::from_be_bytes([a, b, c, d])))
+                Some((Self::from_raw(register)?, i32::from_be_bytes([a, b, c, d])))
             }
             _ => None,
         }
     }
 
-    /// Returns the data of the reply.
+    /// Returns the data of a reply with the value of the register.
     #[must_use]
-    pub const fn encode(self) -> [u8; 6] {
-        let [a, b, c, d] = self.value.to_be_bytes();
-        [REPLY, self.register.as_raw(), a, b, c, d]
-    }
-
-    /// Returns the register.
-    #[must_use]
-    pub const fn register(self) -> Register {
-        self.register
-    }
-
-    /// Returns the value of the register, as on the wire.
-    #[must_use]
-    pub const fn value(self) -> i32 {
-        self.value
+    pub const fn reply(self, value: i32) -> [u8; 6] {
+        let [a, b, c, d] = value.to_be_bytes();
+        [REPLY, self.as_raw(), a, b, c, d]
     }
 }
 

@@ -91,7 +91,7 @@ mod targets;
 #[cfg(test)]
 mod tests;
 
-pub use codec::{Command, Reply, State};
+pub use codec::{Command, State};
 pub use config::{AttachError, Config};
 pub use model::{Counters, IDS, Joint, PULSES_PER_TURN, Register};
 pub use schedule::Joints;

@@ -19,7 +19,7 @@ use embedded_can::Frame;
 /// use drivetrain::encoder::Position;
 /// use drivetrain::frame::CanFrame;
 /// use drivetrain::motor::Devices;
-/// use drivetrain::snake::{Config, Joints, Register, Reply};
+/// use drivetrain::snake::{Config, Joints, Register};
 /// use drivetrain::time::{Instant, Tick};
 /// use drivetrain::units::Angle;
 /// use embedded_can::{Frame, StandardId};
@@ -33,7 +33,7 @@ use embedded_can::Frame;
 /// assert_eq!(sent(&mut joints).as_deref(), Some("003 [2] 03 07")); // where are you?
 ///
 /// let id = StandardId::new(3).ok_or("id")?;
-/// let reply = Reply::new(Register::ActualPosition, 16_384).encode();
+/// let reply = Register::ActualPosition.reply(16_384);
 /// _ = joints.ingest(&CanFrame::new(id, &reply).ok_or("length")?, at_ms(2));
 /// assert_eq!(joints.state(neck).map(|state| state.position.as_turns()), Some(0.25));
 /// joints.zero(neck)?;

@@ -4,7 +4,7 @@ pub(super) mod health;
 
 use super::config::{Offset, Settings, Stall};
 use super::model::{FASTEST, PULSES_PER_TURN, name, to_pulses};
-use super::{AttachError, Command, Config, Joint, Register, Reply, State};
+use super::{AttachError, Command, Config, Joint, Register, State};
 use crate::encoder::{Homing, Position};
 use crate::motor::{Condition, Guard, Link, MotorName, Rival, Timeouts, Traffic};
 use crate::time::{Duration, Instant};
@@ -46,7 +46,7 @@ pub(super) struct Slot {
     stopped: Instant,
     turn: u8,
     pub(super) question: Option<Register>,
-    pub(super) answer: Option<Reply>,
+    pub(super) answer: Option<(Register, i32)>,
     pub(super) unanswered: u32,
     pub(super) bad_replies: u32,
     position_jumps: u16,

@@ -3,7 +3,7 @@
 use super::config::Offset;
 use super::model::to_pulses;
 use super::slot::{Slot, health};
-use super::{AttachError, Config, Joint, Joints, PULSES_PER_TURN, Register, Reply};
+use super::{AttachError, Config, Joint, Joints, PULSES_PER_TURN, Register};
 use crate::encoder::Position;
 use crate::motor::{
     Capabilities, Capability, Condition, Conditions, Health, MotorName, TargetError,
@@ -127,8 +127,8 @@ impl Joints {
         Ok(())
     }
 
-    /// Returns the reply to the last [`read`](Self::read), once.
-    pub fn answer(&mut self, joint: Joint) -> Option<Reply> {
+    /// Returns register and value, as on the wire, of the reply to the last [`read`](Self::read), once.
+    pub fn answer(&mut self, joint: Joint) -> Option<(Register, i32)> {
         self.slot_mut(joint)?.answer.take()
     }
 

@@ -30,7 +30,7 @@
 //! use drivetrain::wire::host_link::*;
 //!
 //! let mut command = HostCommand::default();
-//! command.joints[4] = JointTarget { speed_rpm: 10, position_pulses: 2 * PULSES_PER_TURN };
+//! (command.speeds_rpm[4], command.positions_pulses[4]) = (10, 2 * PULSES_PER_TURN);
 //! command.reset = Reset::Enable;
 //!
 //! let mut buffer = [0; COMMAND_LENGTH];
@@ -93,8 +93,10 @@ const TAGS: [u8; 4] = [13, 14, 15, 16];
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct HostCommand {
-    /// The targets of the 12 joints.
-    pub joints: [JointTarget; JOINTS],
+    /// Where the joints go, in pulses from their zero; 65536 a turn.
+    pub positions_pulses: [i32; JOINTS],
+    /// How fast the joints go there, in rpm: the byte has no sign, the position gives the direction.
+    pub speeds_rpm: [u8; JOINTS],
     /// Target of the gripper's GM6020, in the firmware's unit.
     pub gm6020_position: i16,
     /// Target of the gripper's C610, in the firmware's unit.
@@ -105,30 +107,19 @@ pub struct HostCommand {
     pub reset: Reset,
 }
 
-/// The target of one joint.
-///
-/// # Examples
-/// ```
-/// use drivetrain::wire::host_link::JointTarget;
-///
-/// let target = JointTarget { speed_rpm: 10, position_pulses: -65_536 };
-/// assert_eq!(target.speed_pulses_per_s(), 10_922);
-/// ```
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct JointTarget {
-    /// How fast to go there, in rpm: the byte has no sign, the position gives the direction.
-    pub speed_rpm: u8,
-    /// Where to go, in pulses from the zero of the joint; 65536 a turn.
-    pub position_pulses: i32,
-}
-
-impl JointTarget {
-    /// Returns the speed in pulses per second, rounded down, as taken by the joint motors.
+impl HostCommand {
+    /// Returns the speeds of the joints in pulses per second, rounded down, as taken by the joint motors.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::wire::host_link::HostCommand;
+    ///
+    /// let command = HostCommand { speeds_rpm: [10; 12], ..HostCommand::default() };
+    /// assert_eq!(command.speeds_pulses_per_s(), [10_922; 12]);
+    /// ```
     #[must_use]
-    pub const fn speed_pulses_per_s(&self) -> i32 {
-        self.speed_rpm as i32 * PULSES_PER_TURN / 60
+    pub fn speeds_pulses_per_s(&self) -> [i32; JOINTS] {
+        self.speeds_rpm.map(|rpm| i32::from(rpm) * PULSES_PER_TURN / 60)
     }
 }
 
@@ -186,9 +177,9 @@ impl HostCommand {
     pub fn encode<'a>(&self, out: &'a mut [u8]) -> Result<&'a [u8], EncodeError> {
         let mut writer = Writer::new(out, COMMAND_LENGTH)?;
         writer.put(&HEADER);
-        for joint in &self.joints {
-            writer.put(&[joint.speed_rpm]);
-            writer.put(&joint.position_pulses.to_be_bytes());
+        for (speed_rpm, position_pulses) in self.speeds_rpm.iter().zip(&self.positions_pulses) {
+            writer.put(&[*speed_rpm]);
+            writer.put(&position_pulses.to_be_bytes());
         }
         let [gm6020, c610, sts3032, reset] = TAGS;
         for (tag, position) in [
@@ -223,9 +214,8 @@ impl Decode for HostCommand {
 
 fn read(mut body: Reader<'_>) -> Option<HostCommand> {
     let _header: [u8; 6] = body.take()?;
-    let joints = body.array(|body| {
-        Some(JointTarget { speed_rpm: body.u8()?, position_pulses: body.i32_be()? })
-    })?;
+    let joints: [_; JOINTS] = body.array(|body| Some((body.u8()?, body.i32_be()?)))?;
+    let (speeds_rpm, positions_pulses) = (joints.map(|joint| joint.0), joints.map(|joint| joint.1));
     let mut tagged = || {
         let _tag = body.u8()?;
         body.i16_be()
@@ -233,7 +223,14 @@ fn read(mut body: Reader<'_>) -> Option<HostCommand> {
     let (gm6020_position, c610_position, sts3032_degrees) = (tagged()?, tagged()?, tagged()?);
     let [_tag, reset] = body.take()?;
     let reset = Reset::from_raw(reset);
-    Some(HostCommand { joints, gm6020_position, c610_position, sts3032_degrees, reset })
+    Some(HostCommand {
+        positions_pulses,
+        speeds_rpm,
+        gm6020_position,
+        c610_position,
+        sts3032_degrees,
+        reset,
+    })
 }
 
 /// The length of a telemetry frame in bytes: 10.5 ms at 115200 baud, of the 50 ms between two frames.

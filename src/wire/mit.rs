@@ -9,16 +9,17 @@
 //! ```
 //!
 //! **Eight zero bytes are not rest.** A signed field has its zero in the middle of its range, so eight zero bytes are the
-//! largest negative torque. [`Command::REST`] is rest: no gains, and a torque within half a count of zero.
+//! largest negative torque. [`Impedance::FREE`](crate::motor::Impedance::FREE) is rest: no gains, and a torque within half a count of zero.
 //!
 //! ```
-//! use drivetrain::wire::mit::{Command, Ranges};
+//! use drivetrain::motor::Impedance;
+//! use drivetrain::wire::mit::Ranges;
 //!
 //! const J4310: Ranges = match Ranges::new(12.5, 30.0, 10.0) {
 //!     Ok(ranges) => ranges,
 //!     Err(_) => panic!("the ranges of a DM-J4310 are not valid"),
 //! };
-//! assert_eq!(J4310.encode(&Command::REST), [0x7F, 0xFF, 0x7F, 0xF0, 0x00, 0x00, 0x07, 0xFF]);
+//! assert_eq!(J4310.encode(&Impedance::FREE), [0x7F, 0xFF, 0x7F, 0xF0, 0x00, 0x00, 0x07, 0xFF]);
 //! assert_eq!(J4310.decode(&[0; 8]).torque_nm, -10.0);
 //! # Ok::<(), drivetrain::error::ConfigError>(())
 //! ```
@@ -34,7 +35,8 @@
 //! Sources: Damiao's protocol and registers as python-damiao-driver documents them; frames of public tests, see `tests/data/wire`.
 
 use crate::error::ConfigError;
-use crate::units::AngularVelocity;
+use crate::units::{Angle, AngularVelocity};
+use impedance::Impedance;
 
 /// The data to enable a drive.
 pub const ENABLE: [u8; 8] = special(0xFC);
@@ -53,40 +55,6 @@ const TOP_12: u16 = 0x0FFF;
 
 const fn special(last: u8) -> [u8; 8] {
     [0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, last]
-}
-
-/// A command to the drive, in units of the output shaft.
-#[derive(Debug, Default, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Command {
-    /// The position in rad to hold with `kp`.
-    pub position_rad: f32,
-    /// The velocity in rad/s to hold with `kd`.
-    pub velocity_rad_per_s: f32,
-    /// The stiffness in Nm/rad.
-    pub kp: f32,
-    /// The damping in Nm s/rad.
-    pub kd: f32,
-    /// The torque in Nm on top of both.
-    pub torque_nm: f32,
-}
-
-impl Command {
-    /// Asks for nothing: no gains and no torque.
-    pub const REST: Self =
-        Self { position_rad: 0.0, velocity_rad_per_s: 0.0, kp: 0.0, kd: 0.0, torque_nm: 0.0 };
-
-    /// Returns a command of a torque alone, in Nm.
-    #[must_use]
-    pub const fn torque(torque_nm: f32) -> Self {
-        Self { torque_nm, ..Self::REST }
-    }
-
-    const fn is_torque(&self) -> bool {
-        let Self { position_rad, velocity_rad_per_s, kp, kd, torque_nm: _ } = self;
-        position_rad.to_bits() | velocity_rad_per_s.to_bits() | kp.to_bits() | kd.to_bits() == 0
-    }
 }
 
 /// Measurements of the drive at the output shaft.
@@ -115,13 +83,15 @@ impl Feedback {
 ///
 /// # Examples
 /// ```
-/// use drivetrain::wire::mit::{Command, Ranges};
+/// use drivetrain::motor::Impedance;
+/// use drivetrain::wire::mit::Ranges;
 ///
 /// let ranges = Ranges::new(12.5, 30.0, 10.0)?; // a Damiao DM-J4310
-/// let data = ranges.encode(&Command { kd: 1.0, velocity_rad_per_s: 6.0, ..Command::REST });
+/// let velocity = drivetrain::units::AngularVelocity::from_rad_per_s(6.0);
+/// let data = ranges.encode(&Impedance { damping: 1.0, velocity, ..Impedance::FREE });
 /// let sent = ranges.decode(&data);
-/// assert!((sent.velocity_rad_per_s - 6.0).abs() < 60.0 / 4095.0); // a count
-/// assert!((sent.kd - 1.0).abs() < 5.0 / 4095.0);
+/// assert!((sent.velocity.as_rad_per_s() - 6.0).abs() < 60.0 / 4095.0); // a count
+/// assert!((sent.damping - 1.0).abs() < 5.0 / 4095.0);
 /// let refused = Ranges::new(12.5, 30.0, -10.0).map_err(|error| error.to_string());
 /// assert_eq!(refused, Err("torque range -10: 0.001 to 1000000 are allowed".into()));
 /// # Ok::<(), drivetrain::error::ConfigError>(())
@@ -210,7 +180,7 @@ impl Ranges {
     /// The result is never one of the special frames. A command equal to a special frame, with every field at its end, gets
     /// up to four counts less torque.
     #[must_use]
-    pub const fn encode(&self, command: &Command) -> [u8; 8] {
+    pub const fn encode(&self, command: &Impedance) -> [u8; 8] {
         let [position, velocity, kp, kd, torque] = self.counts(command, TOP_12);
         let first = position << 16 | velocity << 4 | kp >> 8;
         let second = kp << 24 | kd << 12 | torque;
@@ -221,7 +191,7 @@ impl Ranges {
 
     /// Returns the counts of all fields, those of a position of 16 bits.
     #[inline]
-    const fn counts(&self, command: &Command, top: u16) -> [u32; 5] {
+    const fn counts(&self, command: &Impedance, top: u16) -> [u32; 5] {
         let rest = [TOP_16 as u32 / 2, top as u32 / 2, 0, 0, top as u32 / 2];
         let Some(torque) = self.torque.counts(command.torque_nm, top) else { return rest };
         if command.is_torque() {
@@ -229,10 +199,10 @@ impl Ranges {
             return [position, velocity, kp, kd, torque];
         }
         let (Some(position), Some(velocity), Some(kp), Some(kd)) = (
-            self.position.counts(command.position_rad, TOP_16),
-            self.velocity.counts(command.velocity_rad_per_s, top),
-            self.kp.counts(command.kp, top),
-            self.kd.counts(command.kd, top),
+            self.position.counts(command.angle.as_radians(), TOP_16),
+            self.velocity.counts(command.velocity.as_rad_per_s(), top),
+            self.kp.counts(command.stiffness, top),
+            self.kd.counts(command.damping, top),
         ) else {
             return rest;
         };
@@ -241,7 +211,7 @@ impl Ranges {
 
     /// Writes a command as [`encode`](Self::encode), with 16 bits a field: the data of position, velocity, kp and kd, and the torque, which
     /// some drives have in the id.
-    pub(crate) const fn encode_wide(&self, command: &Command) -> ([u8; 8], u16) {
+    pub(crate) const fn encode_wide(&self, command: &Impedance) -> ([u8; 8], u16) {
         let [position, velocity, kp, kd, torque] = self.counts(command, TOP_16);
         let (first, second) = (position << 16 | velocity, kp << 16 | kd);
         let [.., high, low] = torque.to_be_bytes();
@@ -261,14 +231,15 @@ impl Ranges {
 
     /// Reads a command, as a drive does.
     #[must_use]
-    pub const fn decode(&self, data: &[u8; 8]) -> Command {
+    pub const fn decode(&self, data: &[u8; 8]) -> Impedance {
         let [a, b, c, d, e, f, g, h] = *data;
         let ((velocity, kp), (kd, torque)) = (unpair([c, d, e]), unpair([f, g, h]));
-        Command {
-            position_rad: self.position.value(u16::from_be_bytes([a, b]), TOP_16),
-            velocity_rad_per_s: self.velocity.value(velocity, TOP_12),
-            kp: self.kp.value(kp, TOP_12),
-            kd: self.kd.value(kd, TOP_12),
+        let angle = self.position.value(u16::from_be_bytes([a, b]), TOP_16);
+        Impedance {
+            angle: Angle::from_radians(angle),
+            velocity: AngularVelocity::from_rad_per_s(self.velocity.value(velocity, TOP_12)),
+            stiffness: self.kp.value(kp, TOP_12),
+            damping: self.kd.value(kd, TOP_12),
             torque_nm: self.torque.value(torque, TOP_12),
         }
     }
@@ -353,5 +324,74 @@ impl Range {
 
     const fn value(self, counts: u16, top: u16) -> f32 {
         self.lower + counts as f32 * (self.upper - self.lower) / top as f32
+    }
+}
+
+/// The fields of a command; public as [`motor::Impedance`](crate::motor::Impedance).
+pub(crate) mod impedance {
+    use crate::units::{Angle, AngularVelocity};
+
+    /// A spring and a damper at the output shaft, with a torque beside both: the target of a joint of an arm or a leg.
+    ///
+    /// The torque is `stiffness * (angle - measured angle) + damping * (velocity - measured velocity) + torque`, within the limits
+    /// of the motor.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::motor::Impedance;
+    /// use drivetrain::units::Angle;
+    ///
+    /// let hold = Impedance { angle: Angle::from_degrees(30.0), stiffness: 20.0, damping: 0.6, ..Impedance::FREE };
+    /// assert!(hold.is_finite() && hold.torque_nm == 0.0);
+    /// ```
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+    pub struct Impedance {
+        /// The angle where the spring is at rest, in the range of the motor's own angle: turns count.
+        pub angle: Angle,
+        /// The velocity at which the damper is at rest.
+        pub velocity: AngularVelocity,
+        /// The stiffness of the spring in Nm/rad, not negative.
+        pub stiffness: f32,
+        /// The damping in Nm s/rad, not negative.
+        pub damping: f32,
+        /// The torque beside both, in Nm; positive is counter-clockwise: the weight of an arm, say.
+        pub torque_nm: f32,
+    }
+
+    impl Impedance {
+        /// Neither spring nor damper, and no torque.
+        pub const FREE: Self = Self {
+            angle: Angle::ZERO,
+            velocity: AngularVelocity::ZERO,
+            stiffness: 0.0,
+            damping: 0.0,
+            torque_nm: 0.0,
+        };
+
+        /// Returns a torque alone, in Nm.
+        #[must_use]
+        pub const fn torque(torque_nm: f32) -> Self {
+            Self { torque_nm, ..Self::FREE }
+        }
+
+        /// Tells whether each value is finite, and stiffness and damping are not negative.
+        #[must_use]
+        pub const fn is_finite(&self) -> bool {
+            self.angle.is_finite()
+                && self.velocity.is_finite()
+                && self.stiffness.is_finite()
+                && self.damping.is_finite()
+                && self.torque_nm.is_finite()
+                && self.stiffness >= 0.0
+                && self.damping >= 0.0
+        }
+
+        pub(super) const fn is_torque(&self) -> bool {
+            let Self { angle, velocity, stiffness, damping, torque_nm: _ } = self;
+            let [angle, velocity] = [angle.as_radians(), velocity.as_rad_per_s()];
+            angle.to_bits() | velocity.to_bits() | stiffness.to_bits() | damping.to_bits() == 0
+        }
     }
 }

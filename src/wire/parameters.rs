@@ -12,10 +12,10 @@
 //! | what arrives | effect |
 //! |---|---|
 //! | a known parameter, a number within its range | the value holds from now on, a target for 500 ms |
-//! | a number out of range, NaN, infinity | nothing changes; [`ParameterCounts::out_of_range`] |
-//! | an unknown name or number | nothing changes; [`ParameterCounts::unknown`] |
-//! | a line that is none, or has more than 48 bytes | nothing changes; [`ParameterCounts::malformed`] |
-//! | half of a line, then 100 ms without a byte | the half is dropped; [`ParameterCounts::malformed`] |
+//! | a number out of range, NaN, infinity | nothing changes; [`Counts::content_errors`] |
+//! | an unknown name or number | nothing changes; [`Counts::foreign_frames`] |
+//! | a line that is none, or has more than 48 bytes | nothing changes; [`Counts::length_errors`] |
+//! | half of a line, then 100 ms without a byte | the half is dropped; [`Counts::length_errors`] |
 //!
 //! Values are only numbers: no line arms a motor, and a disarmed motor refuses every target. A **setting** holds until
 //! it is set again. A **target** expires, so a cable that is pulled leaves the program without a target, and the motor stops by its
@@ -37,7 +37,7 @@
 //! assert_eq!(first, Some(ParameterRequest::Set { index: KP, value: 2.5 }));
 //! while parameters.read(&mut received, now).is_some() {}
 //! assert_eq!(parameters.value(SPEED, now), Some(60.0)); // 600 and NaN were refused
-//! assert_eq!(parameters.counts().out_of_range, 2);
+//! assert_eq!(parameters.counts().content_errors, 2);
 //!
 //! let later = now + Duration::from_millis(501);
 //! assert_eq!((parameters.value(KP, later), parameters.value(SPEED, later)), (Some(2.5), None));
@@ -49,8 +49,8 @@
 
 use core::fmt::Write;
 
-use super::EncodeError;
 use super::vofa::Line;
+use super::{Counts, EncodeError};
 use crate::error::ConfigError;
 use crate::time::{Duration, Instant};
 
@@ -119,21 +119,6 @@ pub enum ParameterRequest {
     List,
 }
 
-/// How many lines were taken, and why others were not. Each saturates at 65535.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct ParameterCounts {
-    /// Lines that set a parameter, or asked for the table.
-    pub accepted: u16,
-    /// Numbers that are out of range, NaN or infinite.
-    pub out_of_range: u16,
-    /// Names and numbers of no parameter.
-    pub unknown: u16,
-    /// Lines of another form, or longer than 48 bytes, or broken off.
-    pub malformed: u16,
-}
-
 /// A table of `N` parameters, with the values that were set.
 #[derive(Debug, Clone)]
 pub struct Parameters<const N: usize> {
@@ -145,7 +130,7 @@ pub struct Parameters<const N: usize> {
     /// Above [`LINE`]: the line is too long, and dropped up to its end.
     length: usize,
     heard: Instant,
-    counts: ParameterCounts,
+    counts: Counts,
 }
 
 impl<const N: usize> Parameters<N> {
@@ -176,7 +161,7 @@ impl<const N: usize> Parameters<N> {
             line: [0; LINE],
             length: 0,
             heard: Instant::START,
-            counts: ParameterCounts::default(),
+            counts: Counts::default(),
         })
     }
 
@@ -192,7 +177,7 @@ impl<const N: usize> Parameters<N> {
     pub fn read(&mut self, input: &mut &[u8], now: Instant) -> Option<ParameterRequest> {
         if self.length > 0 && now.since(self.heard) > PAUSE {
             self.length = 0;
-            count(&mut self.counts.malformed);
+            count(&mut self.counts.length_errors);
         }
         self.heard = now;
         while let [byte, rest @ ..] = input {
@@ -222,9 +207,18 @@ impl<const N: usize> Parameters<N> {
         holds.then_some(value)
     }
 
-    /// Returns how many lines were taken, and why others were not.
+    /// Returns how many lines were taken, and why others were not; each saturates.
+    ///
+    /// | counter | lines |
+    /// |---|---|
+    /// | `frames` | set a parameter, or ask for the table |
+    /// | `content_errors` | have a number that is out of range, NaN or infinite |
+    /// | `foreign_frames` | name no parameter |
+    /// | `length_errors` | have another form or more than 48 bytes, or are broken off |
+    ///
+    /// The other counters stay zero.
     #[must_use]
-    pub const fn counts(&self) -> ParameterCounts {
+    pub const fn counts(&self) -> Counts {
         self.counts
     }
 
@@ -256,7 +250,7 @@ impl<const N: usize> Parameters<N> {
     fn finish(&mut self, now: Instant) -> Option<ParameterRequest> {
         let length = core::mem::take(&mut self.length);
         let Some(line) = self.line.get(..length) else {
-            count(&mut self.counts.malformed);
+            count(&mut self.counts.length_errors);
             return None;
         };
         let line = line.split(|byte| *byte == b'#').next().unwrap_or(&[]).trim_ascii();
@@ -264,30 +258,30 @@ impl<const N: usize> Parameters<N> {
             return None;
         }
         if line == b"?" {
-            count(&mut self.counts.accepted);
+            count(&mut self.counts.frames);
             return Some(ParameterRequest::List);
         }
         let mut halves = line.splitn(2, |byte| *byte == b'=');
         let (Some(key), Some(text)) = (halves.next(), halves.next()) else {
-            count(&mut self.counts.malformed);
+            count(&mut self.counts.length_errors);
             return None;
         };
         let Some(value) = parse_number(text.trim_ascii()) else {
-            count(&mut self.counts.malformed);
+            count(&mut self.counts.length_errors);
             return None;
         };
         let Some((index, parameter)) = self.find(key.trim_ascii()) else {
-            count(&mut self.counts.unknown);
+            count(&mut self.counts.foreign_frames);
             return None;
         };
         if !(parameter.least <= value && value <= parameter.most) {
-            count(&mut self.counts.out_of_range);
+            count(&mut self.counts.content_errors);
             return None;
         }
         if let Some(place) = self.values.get_mut(index) {
             *place = Some((now, value));
         }
-        count(&mut self.counts.accepted);
+        count(&mut self.counts.frames);
         Some(ParameterRequest::Set { index, value })
     }
 
@@ -302,7 +296,7 @@ impl<const N: usize> Parameters<N> {
     }
 }
 
-const fn count(counter: &mut u16) {
+const fn count(counter: &mut u32) {
     *counter = counter.saturating_add(1);
 }
 
@@ -432,7 +426,7 @@ mod tests {
         let text = "kp=1.5\n 1 = 2e1 # faster\r\n\n# nothing\nspeed=-40.25\n?\n";
         let expected = [set(0, 1.5), set(1, 20.0), set(2, -40.25), ParameterRequest::List];
         assert_eq!(hear(&mut parameters, text, ms(0)), expected);
-        assert_eq!(parameters.counts(), ParameterCounts { accepted: 4, ..Default::default() });
+        assert_eq!(parameters.counts(), Counts { frames: 4, ..Default::default() });
     }
 
     #[test]
@@ -446,7 +440,13 @@ mod tests {
         for text in [out, unknown, malformed, long] {
             assert_eq!(hear(&mut parameters, text, ms(0)), []);
         }
-        let expected = ParameterCounts { accepted: 2, out_of_range: 8, unknown: 5, malformed: 10 };
+        let expected = Counts {
+            frames: 2,
+            content_errors: 8,
+            foreign_frames: 5,
+            length_errors: 10,
+            ..Counts::default()
+        };
         assert_eq!(parameters.counts(), expected);
         assert_eq!(
             [0, 1, 2, 3].map(|index| parameters.value(index, ms(0))),
@@ -472,7 +472,10 @@ mod tests {
         assert_eq!(hear(&mut parameters, "\n", ms(200)).len(), 1);
         assert_eq!(hear(&mut parameters, "kp=1", ms(300)), []);
         assert_eq!(hear(&mut parameters, "5\n", ms(401)), [], "5 is not the rest of 15");
-        assert_eq!((parameters.value(0, ms(401)), parameters.counts().malformed), (Some(1.0), 2));
+        assert_eq!(
+            (parameters.value(0, ms(401)), parameters.counts().length_errors),
+            (Some(1.0), 2)
+        );
     }
 
     #[test]
@@ -527,10 +530,10 @@ mod tests {
                     prop_assert!((parameter.least..=parameter.most).contains(&value));
                 }
             }
-            let ParameterCounts { accepted, out_of_range, unknown, malformed } = parameters.counts();
-            prop_assert_eq!(accepted, requests);
+            let counts = parameters.counts();
+            prop_assert_eq!(counts.frames, requests);
             let lines = bytes.iter().filter(|byte| **byte == b'\n').count();
-            prop_assert!(usize::from(accepted + out_of_range + unknown + malformed) <= lines);
+            prop_assert!([counts.frames, counts.content_errors, counts.foreign_frames, counts.length_errors].iter().sum::<u32>() as usize <= lines);
         }
     }
 

@@ -8,13 +8,13 @@
 //!
 //! | command | data | here |
 //! |---|---|---|
-//! | `0201` | 13 bytes, or 17 since version 2.0.0 of the protocol | [`RobotState`] |
-//! | `0202` | 16 bytes, or 14 since the season of 2026 | [`PowerHeat`] |
-//! | `0207` | 7 bytes | [`ShotData`] |
-//! | others, and these with another length | up to [`MAX_DATA`] bytes | [`RawMessage`] |
+//! | `0201` | 13 bytes, or 17 since version 2.0.0 of the protocol | [`RefereeMessage::Robot`] |
+//! | `0202` | 16 bytes, or 14 since the season of 2026 | [`RefereeMessage::Power`] |
+//! | `0207` | 7 bytes | [`RefereeMessage::Shot`] |
+//! | others, and these with another length | up to [`MAX_DATA`] bytes | [`RefereeMessage::Raw`] |
 //!
 //! The layouts change with the seasons, and no field names the version: the length alone distinguishes the layouts. Layouts of
-//! before 2024 (for example 27 bytes of `0201`) are [`RawMessage`]s.
+//! before 2024 (for example 27 bytes of `0201`) are [`RefereeMessage::Raw`].
 //!
 //! [`Referee`] reads the bytes, and returns the valid power limit and buffer energy for
 //! [`chassis::PowerBuffer`](crate::chassis::PowerBuffer):
@@ -107,60 +107,108 @@ pub(super) fn checked(frame: &[u8]) -> Result<&[u8], Reject> {
 ///     0xA5, 0x0B, 0x00, 0x01, 0x5C, 0x01, 0x00, 0xAA, 0x2C, 0x01, 0x88, 0x77, 0x66, 0x55, 0x44, 0x33, 0x22, 0x11,
 ///     0xEF, 0x74,
 /// ];
-/// let Some(RefereeMessage::Raw(status)) = decoder.read(&mut bytes) else { return Err("another message") };
-/// assert_eq!(status.command(), 0x0001); // status of the game
-/// assert_eq!(status.data()[1..3], 300_u16.to_le_bytes()); // seconds left
+/// let message = decoder.read(&mut bytes).ok_or("no message")?;
+/// let (command, data) = message.as_raw().ok_or("another message")?;
+/// assert_eq!(command, 0x0001); // status of the game
+/// assert_eq!(data[1..3], 300_u16.to_le_bytes()); // seconds left
 /// # Ok::<(), &str>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum RefereeMessage {
-    /// `0201`, ten times a second.
-    Robot(RobotState),
-    /// `0202`, ten to fifty times a second.
-    Power(PowerHeat),
-    /// `0207`, after each shot.
-    Shot(ShotData),
-    /// Any other.
-    Raw(RawMessage),
+    /// Performance and state of the robot: message `0201`, ten times a second.
+    ///
+    /// ```text
+    /// u8 id, u8 level, u16 HP, u16 HP at most, u16 cooling, u16 heat at most, u16 W, (f32 m/s since 2.0.0), u8 outputs
+    /// ```
+    Robot {
+        /// Number of the robot: 1 to 9 red, 101 to 109 blue.
+        robot_id: u8,
+        /// Level.
+        level: u8,
+        /// Hit points now.
+        hp: u16,
+        /// Hit points at most.
+        max_hp: u16,
+        /// Heat by which the barrel cools each second.
+        barrel_cooling_per_s: u16,
+        /// Heat limit of the barrel.
+        barrel_heat_limit: u16,
+        /// Power limit of the chassis in W, as received. Use [`Referee::power_limit_w`] instead.
+        chassis_power_limit_w: u16,
+        /// Limit of the muzzle velocity in m/s; `None` in the layout of before version 2.0.0.
+        muzzle_velocity_limit_m_s: Option<f32>,
+        /// Whether the output of the gimbal has 24 V.
+        gimbal_is_powered: bool,
+        /// Whether the output of the chassis has 24 V.
+        chassis_is_powered: bool,
+        /// Whether the output of the shooter has 24 V.
+        shooter_is_powered: bool,
+    },
+    /// Energy of the chassis' buffer, and heat of the barrels: message `0202`, ten to fifty times a second.
+    ///
+    /// ```text
+    /// 8 bytes reserved, u16 J, u16 heat 17 mm, (u16 heat of the second 17 mm until 2025), u16 heat 42 mm
+    /// ```
+    ///
+    /// The reserved bytes were voltage, current and power of the chassis until 2024. No field of the frame confirms these values, so
+    /// they are not read.
+    Power {
+        /// Charge of the buffer in J, as received. Use [`Referee::buffer_energy_j`] instead.
+        buffer_energy_j: u16,
+        /// Heat of the 17 mm barrel; of the first barrel if there are two.
+        heat_17mm: u16,
+        /// Heat of the second 17 mm barrel; `None` in the layout of 2026.
+        heat_17mm_second: Option<u16>,
+        /// Heat of the 42 mm barrel.
+        heat_42mm: u16,
+    },
+    /// A shot: message `0207`, after each shot.
+    ///
+    /// ```text
+    /// u8 projectile, u8 shooter, u8 shots per second, f32 m/s
+    /// ```
+    Shot {
+        /// Type of the projectile, as received: 1 is 17 mm, 2 is 42 mm.
+        projectile: u8,
+        /// Number of the shooter, as received: 1 is 17 mm, 3 is 42 mm; 2 was the second 17 mm until 2025.
+        shooter: u8,
+        /// Rate of fire in 1/s.
+        rate_hz: u8,
+        /// Muzzle velocity in m/s: finite, zero or more.
+        muzzle_velocity_m_s: f32,
+    },
+    /// Any other, not serialized: see [`as_raw`](Self::as_raw).
+    #[cfg_attr(feature = "serde", serde(skip))]
+    Raw {
+        /// Number of the command.
+        command: u16,
+        /// Number of bytes of data.
+        length: u8,
+        /// The data, and zeros up to [`MAX_DATA`] bytes.
+        padded: [u8; MAX_DATA],
+    },
 }
 
-/// A message whose data is not read here.
-#[derive(Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct RawMessage {
-    command: u16,
-    length: u8,
-    data: [u8; MAX_DATA],
-}
-
-impl RawMessage {
-    fn new(command: u16, data: &[u8]) -> Option<Self> {
-        let mut message =
-            Self { command, length: u8::try_from(data.len()).ok()?, data: [0; MAX_DATA] };
-        message.data.get_mut(..data.len())?.copy_from_slice(data);
-        Some(message)
+impl RefereeMessage {
+    fn raw(command: u16, data: &[u8]) -> Option<Self> {
+        let length = u8::try_from(data.len()).ok()?;
+        let mut padded = [0; MAX_DATA];
+        padded.get_mut(..data.len())?.copy_from_slice(data);
+        Some(Self::Raw { command, length, padded })
     }
 
-    /// Returns the number of the command.
+    /// Returns the number of the command and the data, 0 to [`MAX_DATA`] bytes, of a message whose data is not read here; `None` for any
+    /// other message.
     #[must_use]
-    pub const fn command(&self) -> u16 {
-        self.command
-    }
-
-    /// Returns the data, 0 to [`MAX_DATA`] bytes.
-    #[must_use]
-    pub fn data(&self) -> &[u8] {
-        self.data.get(..usize::from(self.length)).unwrap_or(&[])
-    }
-}
-
-impl core::fmt::Debug for RawMessage {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.debug_struct("RawMessage")
-            .field("command", &self.command)
-            .field("data", &self.data())
-            .finish()
+    pub fn as_raw(&self) -> Option<(u16, &[u8])> {
+        match self {
+            Self::Raw { command, length, padded } => {
+                Some((*command, padded.get(..usize::from(*length)).unwrap_or(&[])))
+            }
+            _ => None,
+        }
     }
 }
 
@@ -187,10 +235,10 @@ impl Decode for RefereeMessage {
         let command = fields.u16_le().ok_or(Reject::Length)?;
         let data = fields.0;
         let message = match (command, data.len()) {
-            (0x0201, 13 | 17) => robot_state(fields).map(Self::Robot),
-            (0x0202, 14 | 16) => power_heat(fields).map(Self::Power),
-            (0x0207, 7) => shot(fields).map(Self::Shot),
-            _ => RawMessage::new(command, data).map(Self::Raw),
+            (0x0201, 13 | 17) => robot_state(fields),
+            (0x0202, 14 | 16) => power_heat(fields),
+            (0x0207, 7) => shot(fields),
+            _ => Self::raw(command, data),
         };
         message.ok_or(Reject::Content)
     }
@@ -239,61 +287,6 @@ const WITH_SPEED_LIMIT: usize = 5;
 /// Length of the heats of `0202` with a second 17 mm barrel, behind the buffer energy.
 const WITH_SECOND_BARREL: usize = 6;
 
-/// Performance and state of the robot: message `0201`.
-///
-/// ```text
-/// u8 id, u8 level, u16 HP, u16 HP at most, u16 cooling, u16 heat at most, u16 W, (f32 m/s since 2.0.0), u8 outputs
-/// ```
-#[derive(Debug, Default, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct RobotState {
-    /// Number of the robot: 1 to 9 red, 101 to 109 blue.
-    pub robot_id: u8,
-    /// Level.
-    pub level: u8,
-    /// Hit points now.
-    pub hp: u16,
-    /// Hit points at most.
-    pub max_hp: u16,
-    /// Heat by which the barrel cools each second.
-    pub barrel_cooling_per_s: u16,
-    /// Heat limit of the barrel.
-    pub barrel_heat_limit: u16,
-    /// Power limit of the chassis in W, as received. Use [`Referee::power_limit_w`] instead.
-    pub chassis_power_limit_w: u16,
-    /// Limit of the muzzle velocity in m/s; `None` in the layout of before version 2.0.0.
-    pub muzzle_velocity_limit_m_s: Option<f32>,
-    /// Whether the output of the gimbal has 24 V.
-    pub gimbal_is_powered: bool,
-    /// Whether the output of the chassis has 24 V.
-    pub chassis_is_powered: bool,
-    /// Whether the output of the shooter has 24 V.
-    pub shooter_is_powered: bool,
-}
-
-/// Energy of the chassis' buffer, and heat of the barrels: message `0202`.
-///
-/// ```text
-/// 8 bytes reserved, u16 J, u16 heat 17 mm, (u16 heat of the second 17 mm until 2025), u16 heat 42 mm
-/// ```
-///
-/// The reserved bytes were voltage, current and power of the chassis until 2024. No field of the frame confirms these values, so
-/// they are not read.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct PowerHeat {
-    /// Charge of the buffer in J, as received. Use [`Referee::buffer_energy_j`] instead.
-    pub buffer_energy_j: u16,
-    /// Heat of the 17 mm barrel; of the first barrel if there are two.
-    pub heat_17mm: u16,
-    /// Heat of the second 17 mm barrel; `None` in the layout of 2026.
-    pub heat_17mm_second: Option<u16>,
-    /// Heat of the 42 mm barrel.
-    pub heat_42mm: u16,
-}
-
 /// Heat of a barrel, with the limit and the cooling that hold for it.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -307,58 +300,42 @@ pub struct BarrelHeat {
     pub cooling_per_s: u16,
 }
 
-/// A shot: message `0207`.
-///
-/// ```text
-/// u8 projectile, u8 shooter, u8 shots per second, f32 m/s
-/// ```
-#[derive(Debug, Default, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct ShotData {
-    /// Type of the projectile, as received: 1 is 17 mm, 2 is 42 mm.
-    pub projectile: u8,
-    /// Number of the shooter, as received: 1 is 17 mm, 3 is 42 mm; 2 was the second 17 mm until 2025.
-    pub shooter: u8,
-    /// Rate of fire in 1/s.
-    pub rate_hz: u8,
-    /// Muzzle velocity in m/s: finite, zero or more.
-    pub muzzle_velocity_m_s: f32,
-}
-
 /// Reads the data of a message; `None` when too short, or with an impossible value.
-fn robot_state(mut data: Reader<'_>) -> Option<RobotState> {
-    let mut state = RobotState {
-        robot_id: data.u8()?,
-        level: data.u8()?,
-        hp: data.u16_le()?,
-        max_hp: data.u16_le()?,
-        barrel_cooling_per_s: data.u16_le()?,
-        barrel_heat_limit: data.u16_le()?,
-        chassis_power_limit_w: data.u16_le()?,
-        ..RobotState::default()
-    };
-    if data.0.len() == WITH_SPEED_LIMIT {
-        state.muzzle_velocity_limit_m_s = Some(velocity(&mut data)?);
-    }
+fn robot_state(mut data: Reader<'_>) -> Option<RefereeMessage> {
+    let (robot_id, level) = (data.u8()?, data.u8()?);
+    let (hp, max_hp) = (data.u16_le()?, data.u16_le()?);
+    let (barrel_cooling_per_s, barrel_heat_limit) = (data.u16_le()?, data.u16_le()?);
+    let chassis_power_limit_w = data.u16_le()?;
+    let has_limit = data.0.len() == WITH_SPEED_LIMIT;
+    let muzzle_velocity_limit_m_s = if has_limit { Some(velocity(&mut data)?) } else { None };
     let outputs = data.u8()?;
-    state.gimbal_is_powered = outputs & 1 != 0;
-    state.chassis_is_powered = outputs & 2 != 0;
-    state.shooter_is_powered = outputs & 4 != 0;
-    Some(state)
+    Some(RefereeMessage::Robot {
+        robot_id,
+        level,
+        hp,
+        max_hp,
+        barrel_cooling_per_s,
+        barrel_heat_limit,
+        chassis_power_limit_w,
+        muzzle_velocity_limit_m_s,
+        gimbal_is_powered: outputs & 1 != 0,
+        chassis_is_powered: outputs & 2 != 0,
+        shooter_is_powered: outputs & 4 != 0,
+    })
 }
 
-fn power_heat(mut data: Reader<'_>) -> Option<PowerHeat> {
+fn power_heat(mut data: Reader<'_>) -> Option<RefereeMessage> {
     let _reserved: [u8; 8] = data.take()?;
     let buffer_energy_j = data.u16_le()?;
     let has_second = data.0.len() == WITH_SECOND_BARREL;
     let heat_17mm = data.u16_le()?;
     let heat_17mm_second = if has_second { Some(data.u16_le()?) } else { None };
-    Some(PowerHeat { buffer_energy_j, heat_17mm, heat_17mm_second, heat_42mm: data.u16_le()? })
+    let heat_42mm = data.u16_le()?;
+    Some(RefereeMessage::Power { buffer_energy_j, heat_17mm, heat_17mm_second, heat_42mm })
 }
 
-fn shot(mut data: Reader<'_>) -> Option<ShotData> {
-    Some(ShotData {
+fn shot(mut data: Reader<'_>) -> Option<RefereeMessage> {
+    Some(RefereeMessage::Shot {
         projectile: data.u8()?,
         shooter: data.u8()?,
         rate_hz: data.u8()?,

@@ -4,7 +4,7 @@ use crate::{PAUSE_MS, RIVAL_MS, at_ms};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::Devices;
 use drivetrain::motor::{self, ArmError, Ingest};
-use drivetrain::snake::{Command, Config, Joint, Joints, Register, Reply};
+use drivetrain::snake::{Command, Config, Joint, Joints, Register};
 use drivetrain::time::Tick;
 use embedded_can::{Frame, StandardId};
 
@@ -42,7 +42,7 @@ impl Bench {
                 let Some(Command::Read(register)) = Command::decode(sent.data()) else { continue };
                 if id != silent {
                     let enabled = i32::from(register == Register::Enable);
-                    let reply = frame(id, &Reply::new(register, enabled).encode());
+                    let reply = frame(id, &register.reply(enabled));
                     assert_eq!(self.joints.ingest(&reply, at_ms(self.ms)), Ingest::Taken);
                 }
             }

@@ -2,7 +2,7 @@
 
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    Claim, Ingest, Malformed, MotorName, Order, Own, OwnMotor, Role, Severity, Target, Vitals,
+    Claim, Ingest, Malformed, MotorName, Order, Own, OwnMotor, Role, Target, Vitals,
 };
 use drivetrain::units::AngularVelocity;
 use embedded_can::{Frame, Id, StandardId};
@@ -60,7 +60,7 @@ impl OwnMotor for Mine {
         };
         let share = |byte: u8| f32::from(byte.cast_signed()) / 100.0;
         self.vitals = Vitals {
-            error: (code != 0).then_some(Severity::Fault),
+            has_fault: code != 0,
             error_code: code,
             current: share(current),
             speed: share(speed),

@@ -3,7 +3,7 @@
 use super::*;
 use drivetrain::encoder::Position;
 use drivetrain::motor::Claim;
-use drivetrain::snake::{Command, Config as JointConfig, Joint, Joints, Register, Reply};
+use drivetrain::snake::{Command, Config as JointConfig, Joint, Joints, Register};
 use drivetrain::units::Angle;
 
 /// Joints that answer what they are asked.
@@ -30,7 +30,7 @@ impl Subject for Snake {
         let (joint, name) = self.0.joints().nth(motor)?;
         let register = self.0.awaited(joint).unwrap_or(Register::ActualPosition);
         let value = i32::from(register == Register::Enable);
-        CanFrame::new(id(u16::from(name.id())), &Reply::new(register, value).encode())
+        CanFrame::new(id(u16::from(name.id())), &register.reply(value))
     }
     fn drive(&mut self, share: f32) -> Result<(), TargetError> {
         let position = Position::from_angle(Angle::from_turns(share));

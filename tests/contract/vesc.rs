@@ -3,7 +3,7 @@
 use super::*;
 use drivetrain::encoder::GearRatio;
 use drivetrain::motor::{AngleDrive, Role};
-use drivetrain::sim::{Drive as _, VescDrive, VescMotor};
+use drivetrain::sim::{Drive as _, VescDrive};
 use drivetrain::units::Angle;
 use drivetrain::vesc::{Mode, Model, Motor, Rest};
 use std::cell::{Cell, RefCell};
@@ -31,14 +31,7 @@ struct Station {
 
 impl Station {
     fn new(mode: Mode, rest: Rest, set: Drive) -> Self {
-        let motor = VescMotor {
-            pole_pairs: 7,
-            gear: 1.0,
-            torque_constant_nm_per_a: 0.05,
-            current_max_a: 40.0,
-            no_load_rad_per_s: 300.0,
-        };
-        let drive = VescDrive::new(23, motor);
+        let drive = VescDrive::of(MODEL, 23).with_current_max(40.0);
         let motor = Motor::new(MODEL, 23, mode).unwrap().with_rest(rest).unwrap();
         Self { motor: Own::new(motor), drive: drive.into(), answer: Cell::new(None), set, rest }
     }

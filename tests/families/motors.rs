@@ -6,9 +6,7 @@ use drivetrain::control::PidConfig;
 use drivetrain::encoder::GearRatio;
 use drivetrain::error::ConfigError;
 use drivetrain::motor::{AngleDrive, ImpedanceControl, Own, OwnMotor, TargetError, VelocityDrive};
-use drivetrain::sim::{
-    DamiaoDrive, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive, VescMotor,
-};
+use drivetrain::sim::{DamiaoDrive, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive};
 use drivetrain::time::Duration;
 use drivetrain::units::{Angle, AngularVelocity};
 use drivetrain::{damiao, lk, odrive, rmd, robstride, vesc};
@@ -204,14 +202,7 @@ fn robstride_in(
 }
 
 fn vesc_in(mode: vesc::Mode, set: Set<vesc::Motor>) -> Station {
-    let motor = VescMotor {
-        pole_pairs: 7,
-        gear: 1.0,
-        torque_constant_nm_per_a: 0.05,
-        current_max_a: 40.0,
-        no_load_rad_per_s: 300.0,
-    };
-    let drive = Vesc(VescDrive::new(23, motor));
+    let drive = Vesc(VescDrive::of(VESC, 23).with_current_max(40.0));
     Station::new(vesc::Motor::new(VESC, 23, mode).unwrap(), set, drive)
 }
 

@@ -9,7 +9,7 @@ use drivetrain::motor::{Ingest, Link, Malformed};
 use drivetrain::runner::{BusCondition, FrameQueue, Nb, Runner};
 use drivetrain::sim::{Fault, Line, Simulation};
 use drivetrain::time::{Duration, Instant, ManualClock, Tick};
-use embedded_can::{ExtendedId, Frame, StandardId};
+use embedded_can::{ErrorKind, ExtendedId, Frame, StandardId};
 
 /// The cases of this file.
 pub(crate) const CASES: &[Case] = cases![
@@ -236,7 +236,7 @@ fn f12_a_full_queue_and_an_overrun_are_counted_and_freshness_does_the_rest() {
     rig.drive(100);
     world.advance(Duration::from_millis(20)); // the application hangs
     rig.drive(50);
-    assert_eq!(rig.runner.statistics().receive_errors.overrun, 1);
+    assert_eq!(rig.runner.statistics().receive_errors_of(ErrorKind::Overrun), 1);
     let overrun = rig.runner.edges().find(|edge| edge.condition == BusCondition::ReceiveOverrun);
     assert_eq!(
         overrun.map(|edge| (edge.at, edge.began)),

@@ -154,7 +154,7 @@ impl<'w> Rig<'w> {
     fn add_up(&mut self) {
         let (s, bus) = (self.runner.statistics(), self.runner.device().counters());
         assert_eq!(s.received, s.taken + s.unrelated + s.malformed);
-        assert_eq!(s.offered, s.sent + s.refused + s.send_errors.total());
+        assert_eq!(s.offered, s.sent + s.refused + s.send_errors());
         let waiting = (bus.packed + s.evicted).checked_sub(s.sent + s.superseded);
         assert!(waiting.is_some_and(|waiting| waiting <= 1), "{s:?} {bus:?}");
     }

@@ -2,10 +2,11 @@
 
 use drivetrain::frame::CanFrame;
 use drivetrain::math::wrap_pi;
+use drivetrain::motor::Impedance;
 use drivetrain::motor::{Capabilities, Capability, Claim, Ingest, Malformed, MotorName, Order};
-use drivetrain::motor::{OwnMotor, Role, Severity, Target, Vitals};
+use drivetrain::motor::{OwnMotor, Role, Target, Vitals};
 use drivetrain::units::{Angle, AngularVelocity};
-use drivetrain::wire::mit::{self, Command, Feedback, Ranges};
+use drivetrain::wire::mit::{self, Feedback, Ranges};
 use embedded_can::{Frame, Id, StandardId};
 
 /// Position in rad, velocity in rad/s, torque in Nm: the registers PMAX, VMAX and TMAX of the drive have to say the same.
@@ -98,7 +99,7 @@ impl OwnMotor for J4310 {
     }
 
     fn rest(&mut self) -> CanFrame {
-        self.frame(RANGES.encode(&Command::REST))
+        self.frame(RANGES.encode(&Impedance::FREE))
     }
 
     /// The loops are in the drive, so it takes no step. Position and velocity are sent so near that the torque, which is gains times
@@ -107,22 +108,32 @@ impl OwnMotor for J4310 {
         let Feedback { position_rad, velocity_rad_per_s, .. } = self.measured;
         let (kp, kd) = (share * STIFFNESS, share * DAMPING);
         let command = match target {
-            Target::Torque(nm) => Command::torque(nm.clamp(-share * LIMIT_NM, share * LIMIT_NM)),
+            Target::Torque(nm) => Impedance::torque(nm.clamp(-share * LIMIT_NM, share * LIMIT_NM)),
             Target::Velocity(velocity) => {
                 let wanted = velocity.as_rad_per_s().clamp(-LIMIT_RAD_PER_S, LIMIT_RAD_PER_S);
-                Command { velocity_rad_per_s: self.near(wanted, 0.0), kd, ..Command::REST }
+                Impedance {
+                    velocity: AngularVelocity::from_rad_per_s(self.near(wanted, 0.0)),
+                    damping: kd,
+                    ..Impedance::FREE
+                }
             }
             Target::Angle(angle) if !self.is_at_end => {
                 let way = wrap_pi(angle.as_radians() - position_rad);
                 let near = position_rad + way.clamp(-LIMIT_NM / STIFFNESS, LIMIT_NM / STIFFNESS);
                 let near = near.clamp(-PMAX_RAD, PMAX_RAD);
                 let velocity_rad_per_s = self.near(0.0, STIFFNESS * (near - position_rad));
-                Command { position_rad: near, velocity_rad_per_s, kp, kd, ..Command::REST }
+                Impedance {
+                    angle: Angle::from_radians(near),
+                    velocity: AngularVelocity::from_rad_per_s(velocity_rad_per_s),
+                    stiffness: kp,
+                    damping: kd,
+                    ..Impedance::FREE
+                }
             }
-            _ => Command::REST,
+            _ => Impedance::FREE,
         };
-        let torque_nm = command.kp * (command.position_rad - position_rad)
-            + command.kd * (command.velocity_rad_per_s - velocity_rad_per_s)
+        let torque_nm = command.stiffness * (command.angle.as_radians() - position_rad)
+            + command.damping * (command.velocity.as_rad_per_s() - velocity_rad_per_s)
             + command.torque_nm;
         self.effort = torque_nm / LIMIT_NM;
         self.frame(RANGES.encode(&command))
@@ -156,7 +167,8 @@ impl OwnMotor for J4310 {
         let error_code = self.status.filter(|status| *status >= 8);
         Vitals {
             temperature_c: Some(self.temperature_c.into()),
-            error: error_code.map(|_| Severity::Fault),
+            has_fault: error_code.is_some(),
+            has_warning: false,
             error_code: error_code.unwrap_or(0),
             effort: self.effort,
             speed: self.measured.velocity_rad_per_s / RANGES.velocity_rad_per_s(),

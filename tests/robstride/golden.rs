@@ -3,9 +3,10 @@
 use crate::bench::{Bench, operation};
 use crate::extended;
 use drivetrain::frame::CanFrame;
+use drivetrain::motor::Impedance;
 use drivetrain::motor::{Devices, OwnMotor};
 use drivetrain::robstride::{Command, Feedback, Model, Motor, Register, Status};
-use drivetrain::wire::mit;
+use drivetrain::units::{Angle, AngularVelocity};
 use serde_json::Value;
 
 fn vector(id: &str) -> Value {
@@ -72,15 +73,15 @@ fn parameters_have_their_index_low_byte_first_and_the_value_behind() {
 /// Two public tests round to the nearest count; the vendor's code, and this, truncate: one count less where it is not exact.
 #[test]
 fn operation_frames_are_those_that_round_or_one_count_below() {
-    let moved = mit::Command {
-        position_rad: 1.0,
-        velocity_rad_per_s: 2.0,
-        kp: 50.0,
-        kd: 1.0,
+    let moved = Impedance {
+        angle: Angle::from_radians(1.0),
+        velocity: AngularVelocity::from_rad_per_s(2.0),
+        stiffness: 50.0,
+        damping: 1.0,
         torque_nm: 3.0,
     };
     for (id, model, motor, command) in [
-        ("cybergear.op.zero.round", Model::CYBERGEAR, 66, mit::Command::REST),
+        ("cybergear.op.zero.round", Model::CYBERGEAR, 66, Impedance::FREE),
         ("robstride.rs02.op", Model::RS02, 1, moved),
     ] {
         let expected = fields(&frame(&vector(id)["expect"]));

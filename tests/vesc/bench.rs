@@ -4,7 +4,7 @@ use drivetrain::control::PidConfig;
 use drivetrain::encoder::GearRatio;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Devices, Ingest, Own};
-use drivetrain::sim::{Drive, VescDrive, VescMotor};
+use drivetrain::sim::{Drive, VescDrive};
 use drivetrain::time::{Instant, Tick};
 use drivetrain::units::AngularVelocity;
 use drivetrain::vesc::{Mode, Model, Motor};
@@ -20,14 +20,7 @@ pub(crate) const MODEL: Model = Model {
 
 /// 7 pole pairs, no gear, 0.05 Nm/A; the drive has twice the current of the model.
 pub(crate) fn drive(id: u8) -> VescDrive {
-    let motor = VescMotor {
-        pole_pairs: 7,
-        gear: 1.0,
-        torque_constant_nm_per_a: 0.05,
-        current_max_a: 40.0,
-        no_load_rad_per_s: 300.0,
-    };
-    VescDrive::new(id, motor)
+    VescDrive::of(MODEL, id).with_current_max(40.0)
 }
 
 /// A motor and its drive on a bus that loses nothing. The drive reports at 1 kHz.

@@ -4,7 +4,7 @@ use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, M2006, M3508};
 use drivetrain::encoder::Position;
 use drivetrain::motor::VelocityDrive;
-use drivetrain::shooter::{LoaderFeedback, Shooter, ShooterConfig, ShooterFeedback, ShooterOrder};
+use drivetrain::shooter::{Shooter, ShooterFeedback, ShooterOrder};
 use drivetrain::time::Tick;
 use drivetrain::units::{Angle, AngularVelocity};
 use drivetrain::wire::referee::BarrelHeat;
@@ -32,12 +32,12 @@ impl Turret {
         let left = Config::<M3508>::new(1).speed_loop(FRICTION);
         let right = Config::<M3508>::new(2).speed_loop(FRICTION).reversed();
         let loader = Config::<M2006>::new(3).speed_loop(LOADER);
-        let shooter = ShooterConfig::new(AngularVelocity::from_rpm(400.0), 8, 10.0); // 10 shots in 1 s
+        let shooter = Shooter::new(AngularVelocity::from_rpm(400.0), 8, 10.0)?; // 10 shots in 1 s
         Ok(Self {
             yaw: bus.attach(yaw())?,
             friction: bus.attach_all([left, right])?,
             loader: bus.attach(loader)?,
-            shooter: Shooter::new(shooter)?,
+            shooter,
         })
     }
 
@@ -53,14 +53,14 @@ impl Turret {
             is_armed: bus.is_armed(),
             wheels: self.friction.map(|wheel| bus.velocity(wheel)),
             loader: fresh
-                .map(|state| LoaderFeedback { position: state.position, velocity: state.velocity }),
+                .map(|state| (state.position, state.velocity)),
             heat,
         };
-        let targets = self.shooter.update(order, &feedback, tick);
+        let (wheel_speed, loader_speed) = self.shooter.update(order, &feedback, tick);
         for wheel in self.friction {
-            _ = bus.set_velocity(wheel, targets.wheels);
+            _ = bus.set_velocity(wheel, wheel_speed);
         }
-        _ = bus.set_velocity(self.loader, targets.loader);
+        _ = bus.set_velocity(self.loader, loader_speed);
         _ = bus.set_position(self.yaw, Position::from_angle(angle));
     }
 }

@@ -4,7 +4,7 @@ use super::{JOINTS, at, degrees, gait, pulses, seconds};
 use drivetrain::math::sin_cos;
 use drivetrain::time::{Duration, Instant};
 use drivetrain::wire::host_link::{
-    COMMAND_LENGTH, HostCommand, JointTarget, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
+    COMMAND_LENGTH, HostCommand, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
 };
 use drivetrain::wire::{Counts, Deframer};
 use std::f32::consts::TAU;
@@ -147,17 +147,11 @@ impl Host {
         };
         let swing = GRIPPER_DEG * sin_cos(TAU * GRIPPER_HZ * moving_s).0;
         HostCommand {
-            joints: std::array::from_fn(|joint| {
-                let target = wanted(joint, until_s);
-                let way = target - wanted(joint, from_s) + self.lag_deg(joint, time_s);
-                JointTarget {
-                    speed_rpm: if since_s.is_some() {
-                        rpm(way / PERIOD.as_secs_f32())
-                    } else {
-                        HOMING_RPM
-                    },
-                    position_pulses: pulses(target),
-                }
+            positions_pulses: std::array::from_fn(|joint| pulses(wanted(joint, until_s))),
+            speeds_rpm: std::array::from_fn(|joint| {
+                let way =
+                    wanted(joint, until_s) - wanted(joint, from_s) + self.lag_deg(joint, time_s);
+                if since_s.is_some() { rpm(way / PERIOD.as_secs_f32()) } else { HOMING_RPM }
             }),
             gm6020_position: whole(swing),
             c610_position: whole(-swing),

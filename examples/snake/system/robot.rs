@@ -129,9 +129,9 @@ impl<'w> Robot<'w> {
                 self.accepted.last().filter(|_| command.reset == Reset::None && gap_s < 0.2);
             self.rates = [0.0; JOINTS];
             if let Some(before) = before {
-                let both = command.joints.iter().zip(&before.joints);
+                let both = command.positions_pulses.iter().zip(&before.positions_pulses);
                 for (rate, (new, old)) in self.rates.iter_mut().zip(both) {
-                    let way = new.position_pulses.saturating_sub(old.position_pulses);
+                    let way = new.saturating_sub(*old);
                     *rate = way as f32 / gap_s.max(0.01);
                 }
             }
@@ -236,11 +236,11 @@ impl<'w> Robot<'w> {
     fn follow(&mut self, command: &HostCommand, missing: u64) {
         let further_s = missing.min(2) as f32 * COMMAND_PERIOD.as_secs_f32();
         let (joints, bus) = self.runner.device_mut();
-        let targets = command.joints.iter().zip(self.rates);
-        for (joint, (target, rate)) in self.joints.iter().zip(targets) {
+        let targets = command.positions_pulses.iter().zip(command.speeds_rpm).zip(self.rates);
+        for (joint, ((pulses, rpm), rate)) in self.joints.iter().zip(targets) {
             let way = super::degrees_of(rate * further_s).clamp(-FURTHEST_DEG, FURTHEST_DEG);
-            let target_pulses = target.position_pulses.saturating_add(super::pulses(way));
-            _ = joints.set_speed(*joint, AngularVelocity::from_rpm(target.speed_rpm.into()));
+            let target_pulses = pulses.saturating_add(super::pulses(way));
+            _ = joints.set_speed(*joint, AngularVelocity::from_rpm(rpm.into()));
             _ = joints.set_pulses(*joint, target_pulses);
         }
         let position = |degrees: i16| Position::from_angle(Angle::from_degrees(degrees.into()));

@@ -1,10 +1,10 @@
 //! Motors of Damiao, in each control mode.
 
 use crate::functions::{device, family};
-use crate::opaque::{Function, any};
+use crate::opaque::Function;
 use drivetrain::damiao::*;
 use drivetrain::motor::{
-    AngleDrive, Impedance, ImpedanceControl, Order, Own, OwnMotor, Settings, VelocityDrive,
+    AngleDrive, Impedance, ImpedanceControl, Order, Own, OwnMotor, VelocityDrive,
 };
 
 pub fn call_all() {
@@ -42,25 +42,11 @@ pub fn call_all() {
     .call();
     ImpedanceControl::reset.call();
     Impedance::is_finite.call();
-    settings();
     Mode::position_velocity.call();
     Mode::velocity.call();
     Mode::force_position.call();
     (|control: ImpedanceControl| Mode::from(control)).call();
     motor();
-}
-
-fn settings() {
-    Settings::<Register, 4>::new.call();
-    Settings::<Register, 4>::forget.call();
-    Settings::<Register, 4>::request.call();
-    Settings::<Register, 4>::answer.call();
-    Settings::<Register, 4>::complete.call();
-    Settings::<Register, 4>::inquire.call();
-    Settings::<Register, 4>::ask.call();
-    Settings::<Register, 4>::asked.call();
-    Settings::<Register, 4>::take.call();
-    (|asked: &Settings<Register, 4>| Settings::wrong(asked, |_: Register, _| any())).call();
 }
 
 fn motor() {

@@ -4,7 +4,7 @@ use crate::opaque::{Function, any};
 use core::hint::black_box;
 use drivetrain::control::{Differentiator, Pid, PidConfig, WheelTuning, fhan};
 use drivetrain::dji::{
-    AnyHandle, AttachError, Bus, CommandFrame, Config, Facts, Feedback, Gm6020Current,
+    AnyHandle, AttachError, Bus, Config, Facts, Feedback, Gm6020Current,
     Gm6020Voltage, Handle, M2006, M3508, Message, WordGains,
 };
 use drivetrain::encoder::{GearRatio, Homing, Position, Shaft, resolve_gap, shortest};
@@ -17,7 +17,7 @@ use drivetrain::motor::{
     Visitor, Vitals, WrongSetting,
 };
 use drivetrain::runner::{
-    BlockingTx, EmergencyStop, ErrorCounts, FrameQueue, FrameReceiver, FrameSender, Nb, Runner,
+    BlockingTx, EmergencyStop, FrameQueue, FrameReceiver, FrameSender, Nb, Runner, Statistics,
 };
 use drivetrain::time::TimeStep;
 use drivetrain::time::{Clock, Duration, ExtendedCounter, Instant, ManualClock, Tick, Ticker};
@@ -183,7 +183,10 @@ fn control() {
     Pid::reset_to.call();
     Pid::set_gains.call();
     Pid::set_config.call();
-    Pid::terms.call();
+    Pid::proportional.call();
+    Pid::integral.call();
+    Pid::derivative.call();
+    Pid::feed_forward.call();
     Pid::output.call();
     Pid::config.call();
     Pid::rejected.call();
@@ -392,7 +395,7 @@ fn dji() {
     Feedback::current.call();
     Feedback::temperature.call();
     Feedback::error.call();
-    CommandFrame::id.call();
+    Facts::command_ids.call();
     Facts::rotor_no_load_rpm.call();
     Facts::to_word.call();
     Facts::of_word.call();
@@ -638,7 +641,10 @@ fn runner() {
     Shell::device_mut.call();
     Shell::port_mut.call();
     (|runner: Shell| Runner::into_parts(runner).2).call();
-    ErrorCounts::total.call();
+    Statistics::receive_errors.call();
+    Statistics::receive_errors_of.call();
+    Statistics::send_errors.call();
+    Statistics::send_errors_of.call();
     EmergencyStop::new.call();
     EmergencyStop::set.call();
     EmergencyStop::clear.call();

@@ -1,8 +1,8 @@
 //! Motors of RobStride, in each run mode.
 
 use crate::functions::{device, family};
-use crate::opaque::{Function, any};
-use drivetrain::motor::{AngleDrive, ImpedanceControl, Own, OwnMotor, Settings, VelocityDrive};
+use crate::opaque::Function;
+use drivetrain::motor::{AngleDrive, ImpedanceControl, Own, OwnMotor, VelocityDrive};
 use drivetrain::robstride::*;
 
 pub fn call_all() {
@@ -27,25 +27,11 @@ pub fn call_all() {
     Register::manual.call();
     Register::is_float.call();
     Register::is_writable.call();
-    settings();
     Mode::position.call();
     Mode::velocity.call();
     Mode::current.call();
     (|control: ImpedanceControl| Mode::from(control)).call();
     motor();
-}
-
-fn settings() {
-    Settings::<Register, 3>::new.call();
-    Settings::<Register, 3>::forget.call();
-    Settings::<Register, 3>::request.call();
-    Settings::<Register, 3>::answer.call();
-    Settings::<Register, 3>::complete.call();
-    Settings::<Register, 3>::inquire.call();
-    Settings::<Register, 3>::ask.call();
-    Settings::<Register, 3>::asked.call();
-    Settings::<Register, 3>::take.call();
-    (|asked: &Settings<Register, 3>| Settings::wrong(asked, |_: Register, _| any())).call();
 }
 
 fn motor() {

@@ -66,8 +66,8 @@ pub fn call_all() {
     LoadObserver::velocity_rad_per_s.call();
     LoadObserver::load_nm.call();
     LoadObserver::rejected.call();
-    FeedForward::new.call();
-    FeedForward::effort.call();
+    Plant::of_gains.call();
+    Plant::effort.call();
     MotionLimits::new.call();
     MotionLimits::with_jerk.call();
     MotionLimits::validate.call();
@@ -80,7 +80,7 @@ pub fn call_all() {
     Motion::jerk_at.call();
     Motion::duration_s.call();
     Motion::end.call();
-    MotionTarget::at_rest.call();
+    ProfileState::at_rest.call();
     Motions::<3>::plan.call();
     Motions::<3>::at.call();
     Motions::<3>::duration_s.call();
@@ -136,7 +136,6 @@ fn identification() {
     Plant::speed_loop.call();
     Plant::bandwidth.call();
     Plant::position_loop.call();
-    Plant::feed_forward.call();
     Plant::inertia_kg_m2.call();
     Plant::friction_nm.call();
 }
@@ -171,8 +170,10 @@ fn state_space() {
     LuenbergerObserver::<6, 2, 2>::state.call();
     LuenbergerObserver::<6, 2, 2>::gain.call();
     LuenbergerObserver::<6, 2, 2>::rejected.call();
-    PlantInversion::<6, 2>::new.call();
-    PlantInversion::<6, 2>::effort.call();
-    GainSchedule::<6, 2, 4>::new.call();
-    GainSchedule::<6, 2, 4>::gain.call();
+    LinearSystem::<6, 2>::input_inverse.call();
+    (|plant: &LinearSystem<6, 2>, inverse: &_, reference: &_, next: &_| {
+        plant.effort(inverse, reference, next)
+    })
+    .call();
+    (|table: &[(f32, [[f32; 6]; 2]); 4], parameter| scheduled_gain(table, parameter)).call();
 }

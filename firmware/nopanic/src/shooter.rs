@@ -4,14 +4,13 @@ use crate::opaque::Function;
 use drivetrain::shooter::*;
 
 pub fn call_all() {
-    ShooterConfig::new.call();
-    ShooterConfig::with_tolerance.call();
-    ShooterConfig::with_heat.call();
-    ShooterConfig::with_jam_after.call();
-    ShooterConfig::with_tries.call();
-    ShooterConfig::with_loader_gain.call();
-    ShooterConfig::with_heat_without_referee.call();
-    ShooterConfig::feed_velocity.call();
+    Shooter::with_tolerance.call();
+    Shooter::with_heat.call();
+    Shooter::with_jam_after.call();
+    Shooter::with_tries.call();
+    Shooter::with_loader_gain.call();
+    Shooter::with_heat_without_referee.call();
+    Shooter::feed_velocity.call();
     Shooter::new.call();
     Shooter::update.call();
     Shooter::state.call();

@@ -12,11 +12,8 @@ pub fn call_all() {
     Command::frame.call();
     decode_command.call();
     Command::is_safe.call();
-    Reply::new.call();
     decode_reply.call();
-    Reply::encode.call();
-    Reply::register.call();
-    Reply::value.call();
+    Register::reply.call();
     Config::new.call();
     Config::reversed.call();
     Config::with_speed.call();
@@ -73,9 +70,9 @@ fn decode_command() -> Option<Command> {
     Command::decode(&any::<[u8; 8]>()[..any::<usize>() & 7])
 }
 
-/// `Reply::decode` borrows its argument.
-fn decode_reply() -> Option<Reply> {
-    Reply::decode(&any::<[u8; 8]>()[..any::<usize>() & 7])
+/// `Register::from_reply` borrows its argument.
+fn decode_reply() -> Option<(Register, i32)> {
+    Register::from_reply(&any::<[u8; 8]>()[..any::<usize>() & 7])
 }
 
 /// `Joints::joints` returns a borrowing iterator.

@@ -1,6 +1,7 @@
 //! Byte protocols.
 
 use crate::opaque::Function;
+use drivetrain::motor::Impedance;
 use drivetrain::wire::candump::*;
 use drivetrain::wire::dbus::*;
 use drivetrain::wire::feetech::*;
@@ -8,7 +9,7 @@ use drivetrain::wire::hipnuc::*;
 use drivetrain::wire::host_link::*;
 use drivetrain::wire::mit;
 use drivetrain::wire::parameters::{Parameter, Parameters};
-use drivetrain::wire::referee::{self, RawMessage, Referee, RefereeMessage};
+use drivetrain::wire::referee::{self, Referee, RefereeMessage};
 use drivetrain::wire::supercap::{hkust, pacific_spirit};
 use drivetrain::wire::vofa::*;
 use drivetrain::wire::vt13::VideoRemote;
@@ -72,7 +73,7 @@ pub fn call_all() {
     Present::voltage_v.call();
     Imu::euler_roll_x.call();
     Imu::euler_pitch_x.call();
-    JointTarget::speed_pulses_per_s.call();
+    HostCommand::speeds_pulses_per_s.call();
     Reset::from_raw.call();
     Reset::as_raw.call();
     HostCommand::encode.call();
@@ -96,14 +97,14 @@ pub fn call_all() {
     mit::Ranges::position_rad.call();
     mit::Ranges::torque_nm.call();
     mit::Ranges::velocity_rad_per_s.call();
-    (|ranges: &mit::Ranges, command: &mit::Command| mit::Ranges::encode(ranges, command)).call();
+    (|ranges: &mit::Ranges, command: &Impedance| mit::Ranges::encode(ranges, command)).call();
     (|ranges: &mit::Ranges, data: &[u8; 8]| mit::Ranges::decode(ranges, data)).call();
     (|ranges: &mit::Ranges, data: &[u8; 5]| mit::Ranges::decode_feedback(ranges, data)).call();
     (|ranges: &mit::Ranges, feedback: &mit::Feedback| {
         mit::Ranges::encode_feedback(ranges, feedback)
     })
     .call();
-    mit::Command::torque.call();
+    Impedance::torque.call();
     referee_system();
 }
 
@@ -121,8 +122,7 @@ fn referee_system() {
     (|referee: &mut Referee, input: &mut &'static [u8], now| Referee::read(referee, input, now))
         .call();
     Deframer::<RefereeMessage, { referee::MAX_FRAME }>::read.call();
-    RawMessage::command.call();
-    RawMessage::data.call();
+    (|message: &RefereeMessage| message.as_raw().map(|(_, data)| data.len())).call();
     referee::encode.call();
     Deframer::<VideoRemote, 21>::with_options.call();
     Deframer::<VideoRemote, 21>::read.call();

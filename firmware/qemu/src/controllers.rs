@@ -6,8 +6,8 @@ use crate::rows::swinging;
 use core::hint::black_box;
 use drivetrain::chassis::Odometry;
 use drivetrain::control::{
-    Biquad, Cascade, Differentiator, FeedForward, Identification, LoadObserver, LowPass,
-    MotionLimits, Pid, PidConfig, PositionActuator, Profile, ProfileState, RelayTuner, SlewLimiter,
+    Biquad, Cascade, Differentiator, Identification, LoadObserver, LowPass,
+    MotionLimits, Pid, PidConfig, Plant, PositionActuator, Profile, ProfileState, RelayTuner, SlewLimiter,
     SpeedActuator, StepResponse, Window,
 };
 use drivetrain::error::ConfigError;
@@ -42,7 +42,7 @@ functions! {
     control_slew(limiter: &mut SlewLimiter, target, dt_s) -> f32 = limiter.update(target, dt_s);
     control_profile(profile: &Profile, time_s) -> ProfileState = profile.at(time_s);
     control_plan(limits: &MotionLimits, start, end) -> Result<Profile, ConfigError> = Profile::plan(start, end, limits);
-    control_feed_forward(gains: &FeedForward, velocity, acceleration) -> f32 = gains.effort(velocity, acceleration);
+    control_feed_forward(gains: &Plant, velocity, acceleration) -> f32 = gains.effort(velocity, acceleration);
     control_relay(tuner: &mut RelayTuner, setpoint, measurement, dt_s) -> f32 = tuner.update(setpoint, measurement, dt_s);
     control_identification(identification: &mut Identification, effort, velocity, dt_s) -> () = identification.sample(effort, velocity, dt_s);
     control_load_observer(observer: &mut LoadObserver, velocity, torque, dt_s) -> () = observer.update(velocity, torque, dt_s);
@@ -84,8 +84,8 @@ pub fn rows() {
     let limits = MotionLimits::new(2.0, 8.0);
     profile("profile_trapezoid", "profile_plan_trapezoid", limits);
     profile("profile_s_curve", "profile_plan_s_curve", limits.with_jerk(80.0));
-    let effort = FeedForward::new(black_box(0.3), 0.05, 0.01).unwrap();
-    let each = |effort_of: fn(&FeedForward, f32, f32) -> f32, call| {
+    let effort = Plant::of_gains(black_box(0.3), 0.05, 0.01).unwrap();
+    let each = |effort_of: fn(&Plant, f32, f32) -> f32, call| {
         _ = effort_of(&effort, swinging(call), swinging(call + 1));
     };
     row("feed_forward", &[instructions(control_feed_forward as _, each)]);

@@ -11,7 +11,7 @@ use drivetrain::encoder::GearRatio;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Devices, ImpedanceControl, Ingest, Own, OwnMotor, VelocityDrive};
 use drivetrain::sim::{
-    self, DriveShaft, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive, VescMotor,
+    self, DriveShaft, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive,
 };
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::AngularVelocity;
@@ -251,17 +251,15 @@ pub fn rows() {
         current_limit_a: 20.0,
         max_velocity: AngularVelocity::from_rpm(500.0),
     };
-    let motor = VescMotor {
-        pole_pairs: 15,
-        gear: 1.0,
-        torque_constant_nm_per_a: 0.5,
-        current_max_a: 40.0,
-        no_load_rad_per_s: 60.0,
+    let motor = vesc::Model {
+        current_limit_a: 40.0,
+        max_velocity: AngularVelocity::from_rad_per_s(60.0),
+        ..model
     };
     let mode = vesc::Mode::current_with_speed_loop(SPEED_LOOP).unwrap();
     measure(["vesc_tick", "vesc_ingest", "constant_ingest_vesc"], |ids, start| {
         let motors = ids.map(|id| vesc::Motor::new(model, id, mode).unwrap());
-        let drives = ids.map(|id| Vesc(VescDrive::new(id, motor), false));
+        let drives = ids.map(|id| Vesc(VescDrive::of(motor, id), false));
         Group::new(motors, drives, start)
     });
 }

@@ -5,6 +5,7 @@ use crate::meter::instructions;
 use crate::report::row;
 use crate::wiring::START;
 use core::hint::black_box;
+use drivetrain::motor::Impedance;
 use drivetrain::control::{Pid, PidConfig};
 use drivetrain::damiao::{Model, Motor};
 use drivetrain::frame::CanFrame;
@@ -139,7 +140,7 @@ fn joints_bare(
     let step = TimeStep::of(dt_s);
     for (id, joint) in (1..).zip(joints) {
         let torque_nm = joint.speed.step(1.0, joint.measured.velocity_rad_per_s, &step);
-        let data = ranges.encode(&mit::Command::torque(torque_nm));
+        let data = ranges.encode(&Impedance::torque(torque_nm));
         black_box(&CanFrame::standard(id, data));
     }
 }

@@ -3,16 +3,16 @@
 use crate::meter::{CALLS, instructions, instructions_of};
 use crate::report::row;
 use core::hint::black_box;
-use drivetrain::control::{Motion, MotionLimits, MotionTarget, ProfileState};
+use drivetrain::control::{Motion, MotionLimits, ProfileState};
 use drivetrain::error::ConfigError;
 
-type Plan = fn(&ProfileState, &MotionTarget, &MotionLimits) -> Result<Motion, ConfigError>;
+type Plan = fn(&ProfileState, &ProfileState, &MotionLimits) -> Result<Motion, ConfigError>;
 
 #[unsafe(no_mangle)]
 #[inline(never)]
 fn control_motion_plan(
     from: &ProfileState,
-    to: &MotionTarget,
+    to: &ProfileState,
     limits: &MotionLimits,
 ) -> Result<Motion, ConfigError> {
     Motion::plan(from, to, limits)
@@ -25,7 +25,7 @@ fn control_motion_at(motion: &Motion, time_s: f32) -> ProfileState {
 }
 
 /// A motion to plan: state, target, limits.
-type Case = (ProfileState, MotionTarget, MotionLimits);
+type Case = (ProfileState, ProfileState, MotionLimits);
 
 /// Draws numbers between -1 and 1.
 struct Random(u32);
@@ -43,7 +43,7 @@ impl Random {
         let moving = if call % 4 < 2 { 0.0 } else { self.number() };
         let (top, steep, jerk) = (1.2 + self.number(), 3.0 + 2.5 * self.number(), 15.0);
         let from = ProfileState { position, velocity, acceleration: 4.0 * acceleration };
-        let to = MotionTarget { position: position + way, velocity: moving };
+        let to = ProfileState { position: position + way, velocity: moving, ..ProfileState::default() };
         (from, to, MotionLimits::new(top, steep).with_jerk(jerk + 14.0 * self.number()))
     }
 
@@ -71,7 +71,7 @@ impl Random {
         let moving = if call.is_multiple_of(2) { 0.0 } else { top * self.number() };
         let [velocity, acceleration] = [(); 2].map(|()| 0.8 * self.normal());
         let from = ProfileState { position, velocity, acceleration };
-        let to = MotionTarget { position: target, velocity: moving };
+        let to = ProfileState { position: target, velocity: moving, ..ProfileState::default() };
         (from, to, MotionLimits::new(top, steep).with_jerk(jerk))
     }
 }
@@ -102,7 +102,7 @@ pub fn rows() {
 
     let from = ProfileState { velocity: black_box(0.5), ..ProfileState::default() };
     let limits = MotionLimits::new(2.0, 8.0).with_jerk(80.0);
-    let motion = Motion::plan(&from, &MotionTarget::at_rest(3.0), &limits).unwrap();
+    let motion = Motion::plan(&from, &ProfileState::at_rest(3.0), &limits).unwrap();
     let step_s = motion.duration_s() / CALLS as f32;
     let each = |at: fn(&Motion, f32) -> ProfileState, call| {
         _ = black_box(at(&motion, call as f32 * step_s));

@@ -13,7 +13,7 @@ use drivetrain::dji::{Bus, Handle, M3508};
 use drivetrain::encoder::Position;
 use drivetrain::geometry::{Body, Gimbal, Twist, Vec2};
 use drivetrain::shooter::{
-    LoaderFeedback, Shooter, ShooterConfig, ShooterFeedback, ShooterOrder, ShooterTargets,
+    Shooter, ShooterFeedback, ShooterOrder,
 };
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
@@ -92,7 +92,7 @@ fn robot_cut(model: &PowerModel, loads: &[WheelLoad; 4]) -> (f32, f32) {
 
 #[unsafe(no_mangle)]
 #[inline(never)]
-fn robot_shooter(shooter: &mut Shooter, feedback: &ShooterFeedback, tick: Tick) -> ShooterTargets {
+fn robot_shooter(shooter: &mut Shooter, feedback: &ShooterFeedback, tick: Tick) -> (AngularVelocity, AngularVelocity) {
     shooter.update(ShooterOrder::Spin, feedback, tick)
 }
 
@@ -178,18 +178,15 @@ fn power() {
 
 fn shooter() {
     let wheels = AngularVelocity::from_rpm(6_000.0);
-    let mut shooter = Shooter::new(ShooterConfig::new(wheels, 8, 10.0)).unwrap();
+    let mut shooter = Shooter::new(wheels, 8, 10.0).unwrap();
     let feedback = ShooterFeedback {
         is_armed: true,
         wheels: [Some(wheels); 2],
-        loader: Some(LoaderFeedback {
-            position: Position::from_turns(0),
-            velocity: AngularVelocity::ZERO,
-        }),
+        loader: Some((Position::from_turns(0), AngularVelocity::ZERO)),
         heat: Some(BarrelHeat { heat: 0, limit: 200, cooling_per_s: 10 }),
     };
     let mut now: Instant = START;
-    let function = robot_shooter as fn(&mut Shooter, &ShooterFeedback, Tick) -> ShooterTargets;
+    let function = robot_shooter as fn(&mut Shooter, &ShooterFeedback, Tick) -> (AngularVelocity, AngularVelocity);
     let update = instructions(function, |f, _| {
         now = now + PERIOD;
         _ = black_box(f(&mut shooter, &feedback, Tick::new(now, 0.001)));

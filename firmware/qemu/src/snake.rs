@@ -7,7 +7,7 @@ use core::hint::black_box;
 use drivetrain::encoder::Position;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Devices, Ingest, TargetError};
-use drivetrain::snake::{Command, Config, IDS, Joint, Joints, PULSES_PER_TURN, Register, Reply};
+use drivetrain::snake::{Command, Config, IDS, Joint, Joints, PULSES_PER_TURN, Register};
 use drivetrain::time::{Duration, Instant, Tick};
 use embedded_can::{Frame, StandardId};
 
@@ -16,7 +16,7 @@ const JOINTS: usize = IDS as usize;
 const PERIOD: Duration = Duration::from_millis(1);
 
 pub fn reply(id: u8, register: Register, value: i32) -> CanFrame {
-    let data = Reply::new(register, value).encode();
+    let data = register.reply(value);
     CanFrame::of(StandardId::new(u16::from(id)).unwrap(), data)
 }
 

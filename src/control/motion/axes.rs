@@ -1,5 +1,5 @@
+use crate::control::motion::Motion;
 use crate::control::motion::planner::Planner;
-use crate::control::motion::{Motion, MotionTarget};
 use crate::control::number::{Sum, Wide, finite};
 use crate::control::shaping::{MotionLimits, ProfileState};
 use crate::error::ConfigError;
@@ -15,12 +15,12 @@ use crate::error::ConfigError;
 ///
 /// # Examples
 /// ```
-/// use drivetrain::control::{MotionLimits, MotionTarget, Motions, ProfileState};
+/// use drivetrain::control::{MotionLimits, Motions, ProfileState};
 ///
 /// // A chassis: 2 m forward, 1 m to the left and 1.5 rad about its axis.
 /// let way = MotionLimits::new(2.0, 3.0).with_jerk(30.0); // m/s, m/s², m/s³
 /// let heading = MotionLimits::new(4.0, 10.0).with_jerk(100.0); // rad/s, rad/s², rad/s³
-/// let targets = [2.0, 1.0, 1.5].map(MotionTarget::at_rest);
+/// let targets = [2.0, 1.0, 1.5].map(ProfileState::at_rest);
 /// let motions = Motions::plan(&[ProfileState::default(); 3], &targets, &[way, way, heading])?;
 /// assert!((motions.duration_s() - 1.766_67).abs() < 1e-5); // of the first axis: 2 / 2 + 2 / 3 + 3 / 30
 /// let [x, y, _] = motions.at(0.6);
@@ -42,7 +42,7 @@ impl<const N: usize> Motions<N> {
     /// As [`Motion::plan`], for the first axis that has such a parameter.
     pub fn plan(
         from: &[ProfileState; N],
-        to: &[MotionTarget; N],
+        to: &[ProfileState; N],
         limits: &[MotionLimits; N],
     ) -> Result<Self, ConfigError> {
         Self::from_exact(from, &[0.0; N], to, limits)
@@ -52,7 +52,7 @@ impl<const N: usize> Motions<N> {
     fn from_exact(
         from: &[ProfileState; N],
         rests: &[f32; N],
-        to: &[MotionTarget; N],
+        to: &[ProfileState; N],
         limits: &[MotionLimits; N],
     ) -> Result<Self, ConfigError> {
         let mut planners = [Planner::default(); N];
@@ -168,16 +168,16 @@ impl Mean {
 ///
 /// # Examples
 /// ```
-/// use drivetrain::control::{MotionFollower, MotionLimits, MotionTarget, ProfileState};
+/// use drivetrain::control::{MotionFollower, MotionLimits, ProfileState};
 ///
 /// let limits = [MotionLimits::new(2.0, 8.0).with_jerk(80.0)]; // rad/s, rad/s², rad/s³
 /// let mut yaw = MotionFollower::new([ProfileState::default()]);
 /// for _ in 0..300 {
-///     yaw.update(&[MotionTarget::at_rest(1.0)], &limits, 0.001);
+///     yaw.update(&[ProfileState::at_rest(1.0)], &limits, 0.001);
 /// }
 /// let [turning] = yaw.states();
 /// assert!((turning.velocity - 1.9).abs() < 1e-4); // full speed in 0.05 s: 2 - 80 / 2 * 0.05²
-/// let [turned_round] = yaw.update(&[MotionTarget::at_rest(-1.0)], &limits, 0.001);
+/// let [turned_round] = yaw.update(&[ProfileState::at_rest(-1.0)], &limits, 0.001);
 /// assert!((turned_round.velocity - turning.velocity).abs() <= 0.008);
 /// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
@@ -198,7 +198,7 @@ pub struct MotionFollower<const N: usize> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 struct Plan<const N: usize> {
-    to: [MotionTarget; N],
+    to: [ProfileState; N],
     limits: [MotionLimits; N],
     motions: Motions<N>,
 }
@@ -219,7 +219,7 @@ impl<const N: usize> MotionFollower<N> {
     /// Steps by `dt_s` seconds towards the targets and returns the new states.
     pub fn update(
         &mut self,
-        to: &[MotionTarget; N],
+        to: &[ProfileState; N],
         limits: &[MotionLimits; N],
         dt_s: f32,
     ) -> [ProfileState; N] {

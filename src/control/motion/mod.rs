@@ -47,29 +47,11 @@ use crate::error::ConfigError;
 use planner::Planner;
 
 /// Where a [`Motion`] ends: a position, and the velocity there; the acceleration there is zero.
-///
-/// # Examples
-/// ```
-/// use drivetrain::control::MotionTarget;
-///
-/// assert_eq!(MotionTarget::at_rest(1.5), MotionTarget { position: 1.5, velocity: 0.0 });
-/// ```
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct MotionTarget {
-    /// Position.
-    pub position: f32,
-    /// Velocity, in units of the position a second.
-    pub velocity: f32,
-}
-
-impl MotionTarget {
-    /// Returns a target with a velocity of zero.
-    #[must_use]
-    pub const fn at_rest(position: f32) -> Self {
-        Self { position, velocity: 0.0 }
-    }
+struct End {
+    position: f32,
+    velocity: f32,
 }
 
 /// The phases of a motion from its start to its end, in seconds.
@@ -116,12 +98,12 @@ impl Phases {
 ///
 /// # Examples
 /// ```
-/// use drivetrain::control::{Motion, MotionLimits, MotionTarget, ProfileState};
+/// use drivetrain::control::{Motion, MotionLimits, ProfileState};
 ///
 /// // 1 rad/s already, and 2 rad to go within 2 rad/s, 4 rad/s², 40 rad/s³.
 /// let joint = MotionLimits::new(2.0, 4.0).with_jerk(40.0);
 /// let now = ProfileState { velocity: 1.0, ..ProfileState::default() };
-/// let motion = Motion::plan(&now, &MotionTarget::at_rest(2.0), &joint)?;
+/// let motion = Motion::plan(&now, &ProfileState::at_rest(2.0), &joint)?;
 /// // Up to 2 rad/s: 0.35 s, 0.525 rad; down from it: 0.6 s, 0.6 rad; 0.875 rad between them.
 /// assert!((motion.duration_s() - 1.3875).abs() < 1e-6);
 /// assert!((motion.at(0.5).velocity - 2.0).abs() < 1e-6);
@@ -132,7 +114,7 @@ impl Phases {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Motion {
     start: ProfileState,
-    end: MotionTarget,
+    end: End,
     /// From the start to the end.
     way: f32,
     duration_s: f32,
@@ -146,16 +128,17 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// Plans the fastest motion.
+    /// Plans the fastest motion from a state to a position and a velocity. The acceleration of `to` has to be zero.
     ///
     /// Costs 1743 instructions on a Cortex-M4F, in the mean of 200 states (`docs/figures.md`).
     ///
     /// # Errors
     /// Names the limit that is NaN, infinite, zero, negative or (`jerk`) missing, or the value that is NaN or infinite: `position`,
-    /// `start_velocity`, `start_acceleration`, `target` or `target_velocity`.
+    /// `start_velocity`, `start_acceleration`, `target` or `target_velocity`. [`ConfigError::Unusable`] with `target_acceleration` when
+    /// that is not zero.
     pub fn plan(
         from: &ProfileState,
-        to: &MotionTarget,
+        to: &ProfileState,
         limits: &MotionLimits,
     ) -> Result<Self, ConfigError> {
         Ok(Planner::new(from, 0.0, to, limits)?.fastest())
@@ -187,10 +170,11 @@ impl Motion {
         self.duration_s
     }
 
-    /// Returns the end.
+    /// Returns the state at the end, with an acceleration of zero.
     #[must_use]
-    pub const fn end(&self) -> MotionTarget {
-        self.end
+    pub const fn end(&self) -> ProfileState {
+        let End { position, velocity } = self.end;
+        ProfileState { position, velocity, acceleration: 0.0 }
     }
 
     /// Returns how far it is from the start.

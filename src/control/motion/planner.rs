@@ -1,6 +1,6 @@
 use crate::control::motion::ascent::{Ascent, Beginning, Curve};
 use crate::control::motion::task::{self, Brake, Limits, Task};
-use crate::control::motion::{Motion, MotionTarget, Phases};
+use crate::control::motion::{End, Motion, Phases};
 use crate::control::number::{self, Wide, limited};
 use crate::control::shaping::{MotionLimits, ProfileState};
 use crate::error::{ConfigError, finite, positive};
@@ -9,7 +9,7 @@ use crate::error::{ConfigError, finite, positive};
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 pub(super) struct Planner {
     start: ProfileState,
-    end: MotionTarget,
+    end: End,
     distance: f32,
     limits: Limits,
     unit_s: f32,
@@ -28,7 +28,7 @@ impl Planner {
     pub(super) fn new(
         from: &ProfileState,
         rest: f32,
-        to: &MotionTarget,
+        to: &ProfileState,
         limits: &MotionLimits,
     ) -> Result<Self, ConfigError> {
         let (velocity, acceleration, jerk) = limits.parts();
@@ -41,8 +41,12 @@ impl Planner {
         finite("start_acceleration", from.acceleration)?;
         finite("target", to.position)?;
         finite("target_velocity", to.velocity)?;
+        if to.acceleration != 0.0 {
+            return Err(ConfigError::Unusable("target_acceleration"));
+        }
         let limits = Limits { velocity, acceleration, jerk };
-        let end = MotionTarget { velocity: limited(to.velocity, -velocity, velocity), ..*to };
+        let end =
+            End { position: to.position, velocity: limited(to.velocity, -velocity, velocity) };
         let distance = Wide::difference(end.position, from.position) - rest;
         let distance = if distance.narrow().abs() <= f32::MAX {
             distance

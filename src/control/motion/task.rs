@@ -1,4 +1,4 @@
-use crate::control::motion::MotionTarget;
+use crate::control::motion::End;
 use crate::control::number::Wide;
 use crate::control::shaping::ProfileState;
 
@@ -110,7 +110,7 @@ fn is_usual(task: &Task) -> bool {
 pub(super) fn scaled(
     distance: Wide,
     from: &ProfileState,
-    to: &MotionTarget,
+    to: &End,
     limits: Limits,
 ) -> (Task, Limits) {
     let scale = Scale::of(&limits);
@@ -125,7 +125,7 @@ pub(super) fn scaled(
 /// Lowers a limit of acceleration that the motion comes nowhere near, or a limit of jerk that takes 1e-15 of its time, so that all
 /// powers of them are within `f32`; and raises the limit of an acceleration that is beyond 10^6 times of it.
 #[cold]
-fn commensurate(distance: f32, from: &ProfileState, to: &MotionTarget, limits: Limits) -> Limits {
+fn commensurate(distance: f32, from: &ProfileState, to: &End, limits: Limits) -> Limits {
     let of_velocity = exponent(from.velocity).max(exponent(to.velocity));
     let (of_start, of_distance) = (exponent(from.acceleration), exponent(distance));
     let of_jerk = exponent(limits.jerk);

@@ -10,7 +10,7 @@ fn state(position: f32, velocity: f32, acceleration: f32) -> ProfileState {
 const LIMITS: MotionLimits = MotionLimits::new(2.0, 4.0).with_jerk(20.0);
 
 fn plan(from: ProfileState, target: f32, limits: MotionLimits) -> Motion {
-    Motion::plan(&from, &MotionTarget::at_rest(target), &limits).unwrap()
+    Motion::plan(&from, &ProfileState::at_rest(target), &limits).unwrap()
 }
 
 #[test]
@@ -23,7 +23,7 @@ fn durations_are_those_of_ruckig() {
             panic!("{row:?}");
         };
         let limits = MotionLimits::new(top, steep).with_jerk(jerk);
-        let to = MotionTarget { position: target, velocity };
+        let to = ProfileState { position: target, velocity, ..ProfileState::default() };
         let motion = Motion::plan(&state(p, v, a), &to, &limits).unwrap();
         let error = (motion.duration_s() - duration).abs();
         assert!(error <= 5e-6 * duration.max(1.0), "{} instead of {duration}", motion.duration_s());
@@ -65,7 +65,7 @@ fn a_target_just_missed_is_passed_and_returned_to() {
 #[test]
 fn at_the_target_with_its_velocity_nothing_is_left() {
     for velocity in [0.0, 1.5, -2.0] {
-        let to = MotionTarget { position: 7.0, velocity };
+        let to = ProfileState { position: 7.0, velocity, ..ProfileState::default() };
         let motion = Motion::plan(&state(7.0, velocity, 0.0), &to, &LIMITS).unwrap();
         assert!(motion.duration_s() < 1e-6, "{}", motion.duration_s());
         assert_eq!(motion.at(0.0), state(7.0, velocity, 0.0));
@@ -79,7 +79,11 @@ fn a_moving_target_is_pursued_without_a_detour() {
         let mut follower = MotionFollower::new([state(0.0, 0.0, 0.0)]);
         for step in 0..5_000_u16 {
             let position = velocity * (0.2 + 0.001 * f32::from(step));
-            let [now] = follower.update(&[MotionTarget { position, velocity }], &[LIMITS], 0.001);
+            let [now] = follower.update(
+                &[ProfileState { position, velocity, ..ProfileState::default() }],
+                &[LIMITS],
+                0.001,
+            );
             if step > 2_500 {
                 let behind = (position - now.position) * velocity.signum();
                 assert!((-0.001..0.6).contains(&behind), "{now:?} for {position}");
@@ -104,23 +108,28 @@ fn a_state_outside_of_its_limits_is_brought_back_inside_first() {
 
 #[test]
 fn a_target_velocity_beyond_its_limit_counts_as_the_limit() {
-    let to = MotionTarget { position: 3.0, velocity: -9.0 };
+    let to = ProfileState { position: 3.0, velocity: -9.0, ..ProfileState::default() };
     let motion = Motion::plan(&state(0.0, 0.0, 0.0), &to, &LIMITS).unwrap();
-    assert_eq!(motion.end(), MotionTarget { position: 3.0, velocity: -2.0 });
+    assert_eq!(
+        motion.end(),
+        ProfileState { position: 3.0, velocity: -2.0, ..ProfileState::default() }
+    );
 }
 
 #[test]
 fn what_cannot_be_planned_is_named() {
     let rest = ProfileState::default();
     let parameter = |from, to, limits| Motion::plan(&from, &to, &limits).unwrap_err().parameter();
-    let target = MotionTarget::at_rest(1.0);
+    let target = ProfileState::at_rest(1.0);
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         assert_eq!(parameter(state(bad, 0.0, 0.0), target, LIMITS), "position");
         assert_eq!(parameter(state(0.0, bad, 0.0), target, LIMITS), "start_velocity");
         assert_eq!(parameter(state(0.0, 0.0, bad), target, LIMITS), "start_acceleration");
-        assert_eq!(parameter(rest, MotionTarget::at_rest(bad), LIMITS), "target");
-        let moving = MotionTarget { position: 0.0, velocity: bad };
+        assert_eq!(parameter(rest, ProfileState::at_rest(bad), LIMITS), "target");
+        let moving = ProfileState { position: 0.0, velocity: bad, ..ProfileState::default() };
         assert_eq!(parameter(rest, moving, LIMITS), "target_velocity");
+        let pushed = ProfileState { acceleration: bad, ..target };
+        assert_eq!(parameter(rest, pushed, LIMITS), "target_acceleration");
     }
     for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
         let with = MotionLimits::new;
@@ -135,7 +144,10 @@ fn what_cannot_be_planned_is_named() {
 fn slow_axes_wait_and_a_moving_target_that_cannot_is_met_at_the_next_chance() {
     // The second axis could pass its target in 0.2 s, and not in 1 s but for a way back and forth.
     let from = [state(0.0, 0.0, 0.0), state(0.0, 2.0, 0.0)];
-    let to = [MotionTarget::at_rest(1.0), MotionTarget { position: 0.4, velocity: 2.0 }];
+    let to = [
+        ProfileState::at_rest(1.0),
+        ProfileState { position: 0.4, velocity: 2.0, ..ProfileState::default() },
+    ];
     let alone = from
         .iter()
         .zip(&to)
@@ -156,7 +168,7 @@ fn steps_below_the_spacing_of_f32_add_up_while_the_target_moves() {
     let mut follower = MotionFollower::new([state(1000.0, 0.0, 0.0)]);
     for step in 0..10_000_u16 {
         let target = 1100.0 + f32::from(step % 2); // another one each time
-        follower.update(&[MotionTarget::at_rest(target)], &limits, 0.001);
+        follower.update(&[ProfileState::at_rest(target)], &limits, 0.001);
     }
     let [now] = follower.states();
     assert!((now.position - 1000.0999).abs() < 1.3e-4, "{now:?}");
@@ -167,10 +179,10 @@ fn steps_below_the_spacing_of_f32_add_up_while_the_target_moves() {
 fn bad_targets_limits_and_times_change_nothing_and_are_counted() {
     let mut follower = MotionFollower::new([state(f32::NAN, 1.0, f32::INFINITY)]);
     assert_eq!((follower.states(), follower.left_s()), ([state(0.0, 1.0, 0.0)], 0.0));
-    let good = [MotionTarget::at_rest(1.0)];
+    let good = [ProfileState::at_rest(1.0)];
     let [moved] = follower.update(&good, &[LIMITS], 0.01);
     assert!(follower.left_s() > 0.1);
-    assert_eq!(follower.update(&[MotionTarget::at_rest(f32::NAN)], &[LIMITS], 0.01), [moved]);
+    assert_eq!(follower.update(&[ProfileState::at_rest(f32::NAN)], &[LIMITS], 0.01), [moved]);
     assert_eq!(follower.update(&good, &[MotionLimits::new(0.0, 1.0)], 0.01), [moved]);
     for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
         assert_eq!(follower.update(&good, &[LIMITS], bad), [moved]);
@@ -204,9 +216,10 @@ fn limits() -> impl Strategy<Value = MotionLimits> {
         .prop_map(|(top, steep, jerk)| MotionLimits::new(top, steep).with_jerk(jerk))
 }
 
-fn target() -> impl Strategy<Value = MotionTarget> {
-    (between(-5.0, 5.0), prop_oneof![Just(0.0_f32), between(-2.0, 2.0)])
-        .prop_map(|(position, velocity)| MotionTarget { position, velocity })
+fn target() -> impl Strategy<Value = ProfileState> {
+    (between(-5.0, 5.0), prop_oneof![Just(0.0_f32), between(-2.0, 2.0)]).prop_map(
+        |(position, velocity)| ProfileState { position, velocity, ..ProfileState::default() },
+    )
 }
 
 fn any_state() -> impl Strategy<Value = ProfileState> {
@@ -250,7 +263,7 @@ proptest! {
     ) {
         let limit = |x: f32| if x == 0.0 { 1.0 } else { x.abs() };
         let limits = MotionLimits::new(limit(top), limit(steep)).with_jerk(limit(jerk));
-        let to = MotionTarget { position: to, velocity: to_velocity };
+        let to = ProfileState { position: to, velocity: to_velocity, ..ProfileState::default() };
         let motion = Motion::plan(&state(p, v, a), &to, &limits).unwrap();
         prop_assert!(motion.duration_s().is_finite() && motion.duration_s() >= 0.0);
         let now = motion.at(part * motion.duration_s());
@@ -283,7 +296,7 @@ proptest! {
     fn planning_anew_on_the_way_takes_no_longer(
         from in any_state(), target in between(-5.0, 5.0), limits in limits(), part in between(0.0, 1.0),
     ) {
-        let to = MotionTarget::at_rest(target);
+        let to = ProfileState::at_rest(target);
         let motion = Motion::plan(&from, &to, &limits).unwrap();
         let elapsed_s = part * motion.duration_s();
         let rest = Motion::plan(&motion.at(elapsed_s), &to, &limits).unwrap();

@@ -294,7 +294,7 @@ impl Pid {
             self.core.set_options(self.core.options & !REST_DERIVATIVE);
         }
         self.measurement = measured;
-        self.core.full(error, rate, self.feed_forward(measured + error), step)
+        self.core.full(error, rate, self.feed_forward_of(measured + error), step)
     }
 
     /// Holds the output and counts the step. If time passed without a measurement, D rests in the next good step: the travel

@@ -22,7 +22,7 @@ use law::{CLOSED, REST_DERIVATIVE, TRACK_OUTPUT, UNKNOWN, gate, limit_of};
 ///
 /// # Forms
 /// Step by step, both forms are one law: the increments of the incremental form add up to the terms of the positional form.
-/// The forms differ in the content of the memory, [`Terms::i`]:
+/// The forms differ in the content of the memory, [`Pid::integral`]:
 ///
 /// | | positional | [incremental](PidConfig::with_incremental_form) |
 /// |---|---|---|
@@ -94,22 +94,13 @@ pub struct Pid {
 
 const _: () = assert!(size_of::<Pid>() <= 92, "one for each motor of a bus");
 
-/// The parts of the last output, in its unit.
-///
-/// Their sum is the output, within its limits and its slew limit. Beyond the limits, `i` is the integral left by
-/// anti-windup for the next step.
+/// The terms of the last output.
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Terms {
-    /// Proportional: `kp` times the error; zero in the dead band.
-    pub p: f32,
-    /// Integral, within its limit; the memory of the incremental form.
-    pub i: f32,
-    /// Derivative: `-kd` times the rate of the measurement, filtered if configured.
-    pub d: f32,
-    /// Feed-forward: `kS sign(setpoint) + kV setpoint`; on a circle for the setpoint next to the measurement.
-    pub feed_forward: f32,
+pub(crate) struct Terms {
+    pub(crate) p: f32,
+    pub(crate) i: f32,
+    pub(crate) d: f32,
+    pub(crate) feed_forward: f32,
 }
 
 impl Pid {
@@ -225,9 +216,48 @@ impl Pid {
         Ok(())
     }
 
-    /// Returns the parts of the last output.
+    /// Returns the proportional term of the last output: `kp` times the error; zero in the dead band.
+    ///
+    /// The sum of the four terms is the output, within its limits and its slew limit.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::control::{Pid, PidConfig};
+    /// use drivetrain::time::TimeStep;
+    ///
+    /// let mut pid = Pid::new(PidConfig::new(2.0, 10.0, 0.0).with_feed_forward(0.0, 0.5))?;
+    /// assert_eq!(pid.step(4.0, 3.0, &TimeStep::of(0.01)), 4.1);
+    /// assert_eq!((pid.proportional(), pid.integral()), (2.0, 0.1)); // 2 * 1; 10 * 1 * 0.01
+    /// assert_eq!((pid.derivative(), pid.feed_forward()), (0.0, 2.0)); // 0.5 * 4
+    /// # Ok::<(), drivetrain::error::ConfigError>(())
+    /// ```
     #[must_use]
-    pub fn terms(&self) -> Terms {
+    pub fn proportional(&self) -> f32 {
+        self.terms().p
+    }
+
+    /// Returns the integral term of the last output, within its limit; the memory of the incremental form.
+    ///
+    /// Beyond the limits of the output, the term is the integral left by anti-windup for the next step.
+    #[must_use]
+    pub const fn integral(&self) -> f32 {
+        self.core.integral
+    }
+
+    /// Returns the derivative term of the last output: `-kd` times the rate of the measurement, filtered if configured.
+    #[must_use]
+    pub fn derivative(&self) -> f32 {
+        self.terms().d
+    }
+
+    /// Returns the feed-forward term of the last output: `kS sign(setpoint) + kV setpoint`; on a circle for the setpoint next to the
+    /// measurement.
+    #[must_use]
+    pub fn feed_forward(&self) -> f32 {
+        self.terms().feed_forward
+    }
+
+    pub(crate) fn terms(&self) -> Terms {
         let (core, p) = (&self.core, &self.core.parameters);
         let counts = core.error != UNKNOWN && core.error.abs() >= p.dead_band;
         let is_measured = self.measurement != UNKNOWN;
@@ -236,7 +266,7 @@ impl Pid {
             p: if counts { p.kp * core.error } else { 0.0 },
             i: core.integral,
             d: -(p.kd * core.rate),
-            feed_forward: self.feed_forward(setpoint),
+            feed_forward: self.feed_forward_of(setpoint),
         }
     }
 
@@ -274,7 +304,7 @@ impl Pid {
     }
 
     /// Returns the feed-forward, as far as [`terms`](Self::terms) knows the setpoint too: as `measurement + error`.
-    const fn feed_forward(&self, setpoint: f32) -> f32 {
+    const fn feed_forward_of(&self, setpoint: f32) -> f32 {
         self.velocity_gain * setpoint + friction(self.static_gain, setpoint)
     }
 

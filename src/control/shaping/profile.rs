@@ -53,7 +53,15 @@ impl MotionLimits {
     }
 }
 
-/// Where a [`Profile`] is at a moment, in units of the position and seconds.
+/// State of a motion at a moment, in units of the position and seconds: of a [`Profile`], or of a [`Motion`](crate::control::Motion).
+///
+/// # Examples
+/// ```
+/// use drivetrain::control::ProfileState;
+///
+/// let rest = ProfileState { position: 1.5, velocity: 0.0, acceleration: 0.0 };
+/// assert_eq!(ProfileState::at_rest(1.5), rest);
+/// ```
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -64,6 +72,14 @@ pub struct ProfileState {
     pub velocity: f32,
     /// Acceleration, for an acceleration feed-forward.
     pub acceleration: f32,
+}
+
+impl ProfileState {
+    /// Returns a state with a velocity and an acceleration of zero.
+    #[must_use]
+    pub const fn at_rest(position: f32) -> Self {
+        Self { position, velocity: 0.0, acceleration: 0.0 }
+    }
 }
 
 /// The fastest move from rest to rest within [`MotionLimits`]: a trapezoid of speed, or an S-curve when the jerk is bounded.

@@ -1,7 +1,7 @@
 //! State space: regulators, observers and filters for plants of several states, with matrices as arrays.
 //!
 //! ```text
-//!              +-- PlantInversion: effort of the reference ----+
+//!              +-- LinearSystem::effort of the reference ------+
 //!              |                                               v
 //! reference ---+--> LinearQuadraticRegulator: K (r - x) -----> + ---> u ---> plant ---> y
 //!                        ^                                         |                   |
@@ -12,8 +12,8 @@
 //! |---|---|---|
 //! | [`LinearSystem`] | a plant in steps, from `x' = a x + b u` by zero-order hold | `DiscretizeAB`, `c2d` |
 //! | [`LinearQuadraticRegulator`] | states to a reference, by a gain of least cost | `LinearQuadraticRegulator`, `dlqr` |
-//! | [`GainSchedule`] | gains over a parameter | |
-//! | [`PlantInversion`] | inputs of a reference that moves | `LinearPlantInversionFeedforward` |
+//! | [`scheduled_gain`] | gains over a parameter | |
+//! | [`LinearSystem::effort`] | inputs of a reference that moves | `LinearPlantInversionFeedforward` |
 //! | [`KalmanFilter`] | states from noisy measurements, with their covariance | `KalmanFilter` |
 //! | [`LuenbergerObserver`] | the same with a constant gain: placed, or of the filter in its steady state | `dlqe` |
 //!
@@ -63,7 +63,8 @@ mod riccati;
 mod tests;
 
 pub use observer::{KalmanFilter, LuenbergerObserver};
-pub use regulator::{GainSchedule, LinearQuadraticRegulator, PlantInversion};
+pub(crate) use regulator::GainSchedule;
+pub use regulator::{LinearQuadraticRegulator, scheduled_gain};
 
 use crate::control::matrix::{
     Grid, Number, finite, identity, narrow, row_sum, stepped, sum, times, wide, with_diagonal,

@@ -102,7 +102,7 @@ impl<const N: usize, const M: usize> LinearQuadraticRegulator<N, M> {
         self.output
     }
 
-    /// Replaces the gain from the next step on, as a [`GainSchedule`] asks for. A gain with an entry that is NaN or
+    /// Replaces the gain from the next step on, as [`scheduled_gain`] returns. A gain with an entry that is NaN or
     /// infinite is refused: the last one stays, and [`rejected`](Self::rejected) grows.
     pub fn set_gain(&mut self, gain: &[[f32; N]; M]) {
         if is_finite(gain) {
@@ -125,30 +125,54 @@ impl<const N: usize, const M: usize> LinearQuadraticRegulator<N, M> {
     }
 }
 
-/// Gains of `N` states and `M` inputs over one parameter, from a table of `K` rows: a gain schedule.
+/// Returns the gain at a value of one parameter, from a table of parameter and gain by rising parameter: a gain schedule.
 ///
 /// Between two rows the gains are interpolated linearly; beyond the ends they are those of the ends. A loop whose gain stabilises the
 /// plant at each row is not by that stable between them: choose rows so near that neighbours have like gains, and test between.
 ///
+/// Returns `None` if the parameter is NaN, the table has no row, or the rows on either side of the parameter do not rise. The other rows
+/// are not checked.
+///
 /// # Examples
 /// The leg of a balancing robot changes its length: 0.1 to 0.3 m.
 /// ```
-/// use drivetrain::control::state_space::{GainSchedule, LinearQuadraticRegulator};
+/// use drivetrain::control::state_space::{LinearQuadraticRegulator, scheduled_gain};
 ///
-/// let legs = GainSchedule::new([(0.1, [[10.0, 1.0]]), (0.2, [[14.0, 1.5]]), (0.3, [[20.0, 2.5]])])?;
-/// assert_eq!(legs.gain(0.15), Some([[12.0, 1.25]]));
-/// assert_eq!(legs.gain(1.0), Some([[20.0, 2.5]]));
+/// let legs = [(0.1, [[10.0, 1.0]]), (0.2, [[14.0, 1.5]]), (0.3, [[20.0, 2.5]])];
+/// assert_eq!(scheduled_gain(&legs, 0.15), Some([[12.0, 1.25]]));
+/// assert_eq!(scheduled_gain(&legs, 1.0), Some([[20.0, 2.5]]));
 ///
 /// let mut balance = LinearQuadraticRegulator::from_gain(&[[10.0, 1.0]])?;
-/// if let Some(gain) = legs.gain(0.25) {
+/// if let Some(gain) = scheduled_gain(&legs, 0.25) {
 ///     balance.set_gain(&gain);
 /// }
 /// assert_eq!(balance.step(&[0.0, 0.0], &[0.1, 0.0]), [-1.7]);
 /// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
+#[must_use]
+pub fn scheduled_gain<const N: usize, const M: usize>(
+    table: &[(f32, [[f32; N]; M])],
+    parameter: f32,
+) -> Option<[[f32; N]; M]> {
+    let mut below = None;
+    for (at, gain) in table {
+        if parameter <= *at {
+            let Some((before, lower)) = below else { return Some(*gain) };
+            // Halves, so that a table over the whole of f32 has no infinite width.
+            let share = (0.5 * parameter - 0.5 * before) / (0.5 * at - 0.5 * before);
+            return (before < *at).then(|| {
+                paired(&lower, gain, |lower, upper| (1.0 - share) * lower + share * upper)
+            });
+        }
+        below = Some((*at, *gain));
+    }
+    below.map(|(_, gain)| gain).filter(|_| !parameter.is_nan())
+}
+
+/// Gains of `N` states and `M` inputs over one parameter, from a checked table of `K` rows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct GainSchedule<const N: usize, const M: usize, const K: usize> {
+pub(crate) struct GainSchedule<const N: usize, const M: usize, const K: usize> {
     table: [(f32, [[f32; N]; M]); K],
 }
 
@@ -158,7 +182,7 @@ impl<const N: usize, const M: usize, const K: usize> GainSchedule<N, M, K> {
     /// # Errors
     /// Names `parameter` or `gain` when one is NaN or infinite; [`ConfigError::Reversed`] with `parameter` when it does not rise;
     /// [`ConfigError::Unusable`] with `table` when there is no row.
-    pub fn new(table: [(f32, [[f32; N]; M]); K]) -> Result<Self, ConfigError> {
+    pub(crate) fn new(table: [(f32, [[f32; N]; M]); K]) -> Result<Self, ConfigError> {
         if table.is_empty() {
             return Err(ConfigError::Unusable("table"));
         }
@@ -173,72 +197,55 @@ impl<const N: usize, const M: usize, const K: usize> GainSchedule<N, M, K> {
     }
 
     /// Returns the gain at a value of the parameter; `None` if that is NaN.
-    #[must_use]
-    pub fn gain(&self, parameter: f32) -> Option<[[f32; N]; M]> {
-        let mut below = None;
-        for (at, gain) in &self.table {
-            if parameter <= *at {
-                let Some((before, lower)) = below else { return Some(*gain) };
-                // Halves, so that a table over the whole of f32 has no infinite width.
-                let share = (0.5 * parameter - 0.5 * before) / (0.5 * at - 0.5 * before);
-                return Some(paired(&lower, gain, |lower, upper| {
-                    (1.0 - share) * lower + share * upper
-                }));
-            }
-            below = Some((*at, *gain));
-        }
-        below.map(|(_, gain)| gain).filter(|_| !parameter.is_nan())
+    pub(crate) fn gain(&self, parameter: f32) -> Option<[[f32; N]; M]> {
+        scheduled_gain(&self.table, parameter)
     }
-}
-
-/// Returns the inputs that bring a plant from one reference to the next: feed-forward by inversion of the plant.
-///
-/// ```text
-/// u = B⁺ (next - A reference)      B⁺ = (Bᵀ B)⁻¹ Bᵀ
-/// ```
-/// A reference that the plant can follow is followed exactly. Of another one, the states are approached with the least sum of squares, in the
-/// units of the states. Added to the output of a [`LinearQuadraticRegulator`], it leaves only the errors to the
-/// regulator.
-///
-/// # Examples
-/// ```
-/// use drivetrain::control::state_space::{LinearSystem, PlantInversion};
-///
-/// let cart = LinearSystem::discretized(&[[0.0, 1.0], [0.0, 0.0]], &[[0.0], [0.5]], 0.01)?;
-/// let inversion = PlantInversion::new(&cart)?;
-/// let effort = inversion.effort(&[0.0, 1.0], &[0.010_05, 1.01]); // 1 m/s², a mass of 2 kg
-/// assert!((effort[0] - 2.0).abs() < 1e-3);
-/// # Ok::<(), drivetrain::error::ConfigError>(())
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct PlantInversion<const N: usize, const M: usize> {
-    a: [[f32; N]; N],
-    inverse: [[f32; N]; M],
 }
 
 /// Least pivot of `BᵀB` with columns of length 1.
 const LEAST: f32 = 1e-9;
 
-impl<const N: usize, const M: usize> PlantInversion<N, M> {
-    /// Inverts a plant.
+impl<const N: usize, const M: usize> LinearSystem<N, M> {
+    /// Inverts the matrix of the inputs, for [`effort`](Self::effort): `B⁺ = (Bᵀ B)⁻¹ Bᵀ`, a row for each input.
     ///
     /// # Errors
     /// [`ConfigError::Singular`] with `b`: an input moves no state, or several move the states in the same way, within 3 in 100 000.
-    pub fn new(plant: &LinearSystem<N, M>) -> Result<Self, ConfigError> {
-        let inverse = inverse(plant.b()).ok_or(ConfigError::Singular("b"))?;
-        Ok(Self { a: *plant.a(), inverse })
+    pub fn input_inverse(&self) -> Result<[[f32; N]; M], ConfigError> {
+        inverse(self.b()).ok_or(ConfigError::Singular("b"))
     }
 
-    /// Returns the inputs for one time step, from the reference now and that of the next step. A result that is NaN or infinite is
-    /// zero or the largest number of its sign.
+    /// Returns the inputs that bring the plant from one reference to the next: feed-forward by inversion of the plant.
+    ///
+    /// ```text
+    /// u = B⁺ (next - A reference)
+    /// ```
+    /// `inverse` is the matrix B⁺ of [`input_inverse`](Self::input_inverse). A reference that the plant can follow is followed exactly. Of
+    /// another one, the states are approached with the least sum of squares, in the units of the states. Added to the output of a
+    /// [`LinearQuadraticRegulator`], it leaves only the errors to the regulator. A result that is NaN or infinite is zero or the
+    /// largest number of its sign.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::control::state_space::LinearSystem;
+    ///
+    /// let cart = LinearSystem::discretized(&[[0.0, 1.0], [0.0, 0.0]], &[[0.0], [0.5]], 0.01)?;
+    /// let inverse = cart.input_inverse()?;
+    /// let effort = cart.effort(&inverse, &[0.0, 1.0], &[0.010_05, 1.01]); // 1 m/s², a mass of 2 kg
+    /// assert!((effort[0] - 2.0).abs() < 1e-3);
+    /// # Ok::<(), drivetrain::error::ConfigError>(())
+    /// ```
     #[must_use]
-    pub fn effort(&self, reference: &[f32; N], next: &[f32; N]) -> [f32; M] {
+    pub fn effort(
+        &self,
+        inverse: &[[f32; N]; M],
+        reference: &[f32; N],
+        next: &[f32; N],
+    ) -> [f32; M] {
         let mut change = *next;
-        for (change, alone) in change.iter_mut().zip(apply(&self.a, reference)) {
+        for (change, alone) in change.iter_mut().zip(apply(self.a(), reference)) {
             *change -= alone;
         }
-        apply(&self.inverse, &change).map(number::finite)
+        apply(inverse, &change).map(number::finite)
     }
 }
 

@@ -156,13 +156,12 @@ fn costs_that_are_not_symmetric_or_negative_and_singular_inputs_are_refused() {
     let negative = filter.with_start(&[0.0, 0.0], &diagonal(&[1.0, -1.0])).err();
     assert_eq!(negative, Some(ConfigError::Negative("covariance")));
 
-    let inverted =
-        |b| PlantInversion::new(&LinearSystem::<2, 2>::discrete(&identity(), &b).unwrap());
+    let inverted = |b| LinearSystem::<2, 2>::discrete(&identity(), &b).unwrap().input_inverse();
     assert_eq!(inverted([[1.0, 2.0], [2.0, 4.0]]).err(), Some(ConfigError::Singular("b")));
     assert_eq!(inverted([[1.0, 0.0], [2.0, 0.0]]).err(), Some(ConfigError::Singular("b")));
     // Of one state, two inputs cannot be told.
     let two = LinearSystem::discrete(&[[1.0]], &[[1.0, 2.0]]).unwrap();
-    assert_eq!(PlantInversion::new(&two).err(), Some(ConfigError::Singular("b")));
+    assert_eq!(two.input_inverse().err(), Some(ConfigError::Singular("b")));
 
     let table = [(1.0, [[1.0]]), (1.0, [[2.0]])];
     assert_eq!(GainSchedule::new(table).err(), Some(ConfigError::Reversed("parameter")));
@@ -316,7 +315,7 @@ proptest! {
         let normal = times(&transposed(&b), &b);
         prop_assume!(solved(&wide(&normal), &identity()).is_some_and(|inverse| row_sum(&inverse) < 20.0));
         let plant = LinearSystem::discrete(&a, &b).unwrap();
-        let effort = PlantInversion::new(&plant).unwrap().effort(&x, &plant.predict(&x, &u));
+        let effort = plant.effort(&plant.input_inverse().unwrap(), &x, &plant.predict(&x, &u));
         prop_assert!(near(&[effort], &[u], 1e-4) || largest(&[u]) < 1e-2, "{effort:?} {u:?}");
     }
 
@@ -329,6 +328,9 @@ proptest! {
         prop_assert_eq!(schedule.gain(1.0), Some([[upper]]));
         prop_assert_eq!(schedule.gain(f32::INFINITY), Some([[lower]]));
         prop_assert_eq!(schedule.gain(f32::NEG_INFINITY), Some([[lower]]));
+        prop_assert_eq!(scheduled_gain(&[(1.0, [[lower]]), (1.0, [[upper]])], 2.0), Some([[upper]]));
+        prop_assert_eq!(scheduled_gain(&[(2.0, [[lower]]), (1.0, [[upper]])], 0.0), Some([[lower]]));
+        prop_assert_eq!(scheduled_gain::<1, 1>(&[(f32::NAN, [[lower]]), (1.0, [[upper]])], 0.0), None);
         match schedule.gain(parameter) {
             Some([[gain]]) => prop_assert!(gain >= lower.min(upper) - 1e-5 && gain <= lower.max(upper) + 1e-5),
             None => prop_assert!(parameter.is_nan()),
@@ -358,9 +360,9 @@ proptest! {
                     prop_assert!(matrix::is_finite(&[filter.state()]) && matrix::is_finite(&filter.covariance()));
                 }
             }
-            if let Ok(inversion) = PlantInversion::new(&plant) {
+            if let Ok(inverse) = plant.input_inverse() {
                 for (one, two) in &signals {
-                    prop_assert!(inversion.effort(&[1.0; 3], &[*one; 3])[0].is_finite() || two.is_nan() || one.is_nan());
+                    prop_assert!(plant.effort(&inverse, &[1.0; 3], &[*one; 3])[0].is_finite() || two.is_nan() || one.is_nan());
                 }
             }
         }

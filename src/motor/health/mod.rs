@@ -342,10 +342,8 @@ impl defmt::Format for Conditions {
 }
 
 /// Severity of an error reported by an ESC.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Severity {
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Severity {
     /// The ESC continues, with a warning.
     Warning,
     /// The motor must not be driven.

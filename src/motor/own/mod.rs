@@ -10,21 +10,21 @@ mod registers;
 mod route;
 mod settings;
 
+pub use crate::wire::mit::impedance::Impedance;
 pub use impedance::ImpedanceControl;
 pub(crate) use impedance::{Shaft, TorqueLoops};
-pub use motor::{Impedance, Order, OwnMotor, Target};
-pub use settings::{Inquiry, Settings};
+pub use motor::{Order, OwnMotor, Target};
 
 pub(crate) use mode::{ControlMode, Goal, Questions, Told, inside};
 pub(crate) use motor::ingest_eight;
 pub(crate) use registers::{
     Form, code_from, lowest_bit, mit_model, models, register_questions, registers,
 };
-pub(crate) use settings::{Preparation, TimeoutUnits};
+pub(crate) use settings::{Inquiry, Preparation, Settings, TimeoutUnits};
 
 use super::{
-    BusLoad, Capability, Claim, Guard, Health, HealthConfig, Ingest, Link, Role, Severity,
-    TargetError, Timeouts, Vitals, Watch,
+    BusLoad, Capability, Claim, Guard, Health, HealthConfig, Ingest, Link, Role, TargetError,
+    Timeouts, Vitals, Watch,
 };
 use crate::control::PidConfig;
 use crate::error::{ConfigError, finite};
@@ -383,7 +383,7 @@ impl<M: OwnMotor> Own<M> {
 
     /// Trips the motor as by a fault that the drive reports in one update.
     fn fail(&mut self, now: Instant) {
-        let vitals = Vitals { error: Some(Severity::Fault), ..self.motor.vitals() };
+        let vitals = Vitals { has_fault: true, ..self.motor.vitals() };
         _ = self.watch.check(&mut self.guard, || vitals, now);
         self.guard.relax_until_armed();
     }

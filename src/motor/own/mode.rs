@@ -7,7 +7,7 @@ use crate::error::ConfigError;
 use crate::math::wrap_pi;
 use crate::motor::{Capabilities, Capability};
 use crate::units::AngularVelocity;
-use crate::wire::mit::{self, Ranges};
+use crate::wire::mit::Ranges;
 
 /// Each so many commands the questions begin anew: 32 ms at 1 kHz.
 const ROUND: u8 = 32;
@@ -16,7 +16,7 @@ const ROUND: u8 = 32;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Goal {
     /// The impedance for a drive in MIT mode.
-    Impedance(mit::Command),
+    Impedance(Impedance),
     /// A torque in Nm.
     Torque(f32),
     /// A velocity in rad/s.
@@ -167,7 +167,7 @@ impl ControlMode {
             Follows::Impedance(control) => {
                 let fields = || (Impedance::most(ranges), Impedance::count(ranges, top));
                 let sent = control.step_within(order, shaft, fields)?;
-                Some(Goal::Impedance(sent.into()))
+                Some(Goal::Impedance(sent))
             }
             _ => self.own_goal(order, shaft),
         }

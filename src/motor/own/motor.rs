@@ -8,7 +8,8 @@ use crate::motor::{
 };
 use crate::time::TimeStep;
 use crate::units::{Angle, AngularVelocity};
-use crate::wire::mit::{self, Ranges};
+use crate::wire::mit::Ranges;
+use crate::wire::mit::impedance::Impedance;
 
 /// A motor of your own: its ids, its frames and its loop.
 ///
@@ -260,45 +261,7 @@ pub struct Order {
     pub step: TimeStep,
 }
 
-/// A spring and a damper at the output shaft, with a torque beside both: the target of a joint of an arm or a leg.
-///
-/// The torque is `stiffness * (angle - measured angle) + damping * (velocity - measured velocity) + torque`, within the limits
-/// of the motor.
-///
-/// # Examples
-/// ```
-/// use drivetrain::motor::Impedance;
-/// use drivetrain::units::Angle;
-///
-/// let hold = Impedance { angle: Angle::from_degrees(30.0), stiffness: 20.0, damping: 0.6, ..Impedance::FREE };
-/// assert!(hold.is_finite() && hold.torque_nm == 0.0);
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Impedance {
-    /// The angle where the spring is at rest, in the range of the motor's own angle: turns count.
-    pub angle: Angle,
-    /// The velocity at which the damper is at rest.
-    pub velocity: AngularVelocity,
-    /// The stiffness of the spring in Nm/rad, not negative.
-    pub stiffness: f32,
-    /// The damping in Nm s/rad, not negative.
-    pub damping: f32,
-    /// The torque beside both, in Nm; positive is counter-clockwise: the weight of an arm, say.
-    pub torque_nm: f32,
-}
-
 impl Impedance {
-    /// Neither spring nor damper, and no torque.
-    pub const FREE: Self = Self {
-        angle: Angle::ZERO,
-        velocity: AngularVelocity::ZERO,
-        stiffness: 0.0,
-        damping: 0.0,
-        torque_nm: 0.0,
-    };
-
     /// Returns the largest value of each field of a frame.
     pub(crate) const fn most(ranges: &Ranges) -> Self {
         Self::of(ranges, 1.0, 1.0, 1.0)
@@ -318,31 +281,6 @@ impl Impedance {
             stiffness: stiffness * gain,
             damping: damping * gain,
             torque_nm: ranges.torque_nm() * signed,
-        }
-    }
-
-    /// Tells whether each value is finite, and stiffness and damping are not negative.
-    #[must_use]
-    pub const fn is_finite(&self) -> bool {
-        self.angle.is_finite()
-            && self.velocity.is_finite()
-            && self.stiffness.is_finite()
-            && self.damping.is_finite()
-            && self.torque_nm.is_finite()
-            && self.stiffness >= 0.0
-            && self.damping >= 0.0
-    }
-}
-
-impl From<Impedance> for mit::Command {
-    fn from(impedance: Impedance) -> Self {
-        let Impedance { angle, velocity, stiffness, damping, torque_nm } = impedance;
-        Self {
-            position_rad: angle.as_radians(),
-            velocity_rad_per_s: velocity.as_rad_per_s(),
-            kp: stiffness,
-            kd: damping,
-            torque_nm,
         }
     }
 }

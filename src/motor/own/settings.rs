@@ -7,7 +7,7 @@ use crate::time::Duration;
 /// A question to a drive about a setting, `R` by the protocol's own name.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Inquiry<R> {
+pub(crate) enum Inquiry<R> {
     /// For the value.
     Read(R),
     /// To take a value, until the supply is lost.
@@ -30,20 +30,8 @@ impl<R> Inquiry<R> {
 ///
 /// While the application has a question, each second question is the application's. A read or a write is repeated until the drive
 /// answers; a store is sent once.
-///
-/// # Examples
-/// ```
-/// use drivetrain::motor::{Inquiry, Settings};
-///
-/// let mut settings = Settings::new(["mode", "range"]);
-/// assert_eq!(settings.inquire(), Some(Inquiry::Read("mode")));
-/// assert!(settings.take(Inquiry::Read("mode"), 2.0) && !settings.take(Inquiry::Read("range"), 1.0));
-/// assert_eq!(settings.inquire(), Some(Inquiry::Read("range")));
-/// let is_right = |name: &str, value: f32| name == "mode" && value == 1.0;
-/// assert_eq!(settings.wrong(is_right), Some(("mode", Some(2.0))));
-/// ```
 #[derive(Debug, Clone, Copy)]
-pub struct Settings<R, const N: usize> {
+pub(crate) struct Settings<R, const N: usize> {
     checked: [R; N],
     found: [Option<f32>; N],
     turn: u8,
@@ -108,7 +96,7 @@ impl<R> Preparation<R> {
 impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
     /// Takes the settings to be compared with the configuration; all values are unknown.
     #[must_use]
-    pub const fn new(checked: [R; N]) -> Self {
+    pub(crate) const fn new(checked: [R; N]) -> Self {
         Self {
             checked,
             found: [None; N],
@@ -125,7 +113,7 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
     }
 
     /// Forgets all values: the drive was away. Requests of the application stay.
-    pub const fn forget(&mut self) {
+    pub(crate) const fn forget(&mut self) {
         self.found = [None; N];
         (self.asked, self.missed) = (None, None);
         self.prepare_anew();
@@ -191,18 +179,18 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
     }
 
     /// Takes a question of the application, in the place of a waiting question.
-    pub const fn request(&mut self, inquiry: Inquiry<R>) {
+    pub(crate) const fn request(&mut self, inquiry: Inquiry<R>) {
         self.request = Some(inquiry);
     }
 
     /// Returns the last answer to a question of the application.
     #[must_use]
-    pub const fn answer(&self) -> Option<(R, f32)> {
+    pub(crate) const fn answer(&self) -> Option<(R, f32)> {
         self.answer
     }
 
     /// Returns a question for an unknown value, and awaits the answer; `None` if all values are known.
-    pub fn complete(&mut self) -> Option<Inquiry<R>> {
+    pub(crate) fn complete(&mut self) -> Option<Inquiry<R>> {
         let setting = self.unknown()?;
         Some(self.ask(Inquiry::Read(setting)))
     }
@@ -214,7 +202,7 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
 
     /// Returns the next question: for unknown values, then for each value in turn. Each second question is about a setting that the
     /// drive did not confirm, written and read by turns.
-    pub fn inquire(&mut self) -> Option<Inquiry<R>> {
+    pub(crate) fn inquire(&mut self) -> Option<Inquiry<R>> {
         (self.preparing, self.prepared) = (None, 0);
         let turn = usize::from(self.turn);
         self.turn = self.turn.wrapping_add(1);
@@ -240,7 +228,7 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
     }
 
     /// Notes and returns a question with an awaited answer.
-    pub const fn ask(&mut self, inquiry: Inquiry<R>) -> Inquiry<R> {
+    pub(crate) const fn ask(&mut self, inquiry: Inquiry<R>) -> Inquiry<R> {
         self.asked = Some(inquiry);
         inquiry
     }
@@ -263,12 +251,6 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
         Some(self.ask(Inquiry::Read(setting)))
     }
 
-    /// Returns the question whose answer is awaited.
-    #[must_use]
-    pub const fn asked(&self) -> Option<Inquiry<R>> {
-        self.asked
-    }
-
     /// Takes the value that `read` finds in a frame, if the frame answers the question.
     pub(crate) fn hear(&mut self, read: impl FnOnce(Inquiry<R>) -> Option<f32>) {
         if let Some(asked) = self.asked
@@ -279,7 +261,7 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
     }
 
     /// Takes the value in the answer to a question; `false` if the answer is not awaited.
-    pub fn take(&mut self, inquiry: Inquiry<R>, value: f32) -> bool {
+    pub(crate) fn take(&mut self, inquiry: Inquiry<R>, value: f32) -> bool {
         let Some(setting) = inquiry.setting() else { return false };
         if self.asked != Some(inquiry) {
             return false;
@@ -328,7 +310,7 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
     }
 
     /// Returns the first wrong or unknown setting, with its value in the drive.
-    pub fn wrong(&self, is_right: impl Fn(R, f32) -> bool) -> Option<(R, Option<f32>)> {
+    pub(crate) fn wrong(&self, is_right: impl Fn(R, f32) -> bool) -> Option<(R, Option<f32>)> {
         let settings = self.checked.iter().copied().zip(self.found);
         settings
             .into_iter()
@@ -355,5 +337,21 @@ impl TimeoutUnits {
 
     pub(crate) const fn value(self) -> f32 {
         self.0 as f32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Inquiry, Settings};
+
+    #[test]
+    fn settings_are_asked_for_in_turn_and_the_wrong_one_is_named() {
+        let mut settings = Settings::new(["mode", "range"]);
+        assert_eq!(settings.inquire(), Some(Inquiry::Read("mode")));
+        assert!(settings.take(Inquiry::Read("mode"), 2.0));
+        assert!(!settings.take(Inquiry::Read("range"), 1.0));
+        assert_eq!(settings.inquire(), Some(Inquiry::Read("range")));
+        let is_right = |name: &str, value: f32| name == "mode" && value == 1.0;
+        assert_eq!(settings.wrong(is_right), Some(("mode", Some(2.0))));
     }
 }

@@ -3,7 +3,7 @@
 use super::codec::{FAULTS, VALUE, answer, register};
 use super::*;
 use crate::motor::Impedance;
-use crate::wire::mit;
+use crate::units::{Angle, AngularVelocity};
 use crate::wire::mit::Ranges;
 use std::format;
 
@@ -48,7 +48,7 @@ fn the_count_times_65535_is_the_range() {
 #[test]
 fn rest_is_within_half_a_count_of_no_torque_and_has_no_gains() {
     for model in Model::ALL {
-        let frame = Command::Operation(mit::Command::REST).encode(model, 0xFD, 1);
+        let frame = Command::Operation(Impedance::FREE).encode(model, 0xFD, 1);
         assert_eq!(
             format!("{frame:?}"),
             "017FFF01 [8] 7F FF 7F FF 00 00 00 00",
@@ -60,25 +60,25 @@ fn rest_is_within_half_a_count_of_no_torque_and_has_no_gains() {
 
 #[test]
 fn a_command_that_is_no_number_is_rest() {
-    let rest = Command::Operation(mit::Command::REST).encode(&Model::RS04, 0xFD, 1);
-    let full = mit::Command {
-        position_rad: 12.0,
-        velocity_rad_per_s: 15.0,
-        kp: 5_000.0,
-        kd: 100.0,
+    let rest = Command::Operation(Impedance::FREE).encode(&Model::RS04, 0xFD, 1);
+    let full = Impedance {
+        angle: Angle::from_radians(12.0),
+        velocity: AngularVelocity::from_rad_per_s(15.0),
+        stiffness: 5_000.0,
+        damping: 100.0,
         torque_nm: 120.0,
     };
-    let with = |change: fn(&mut mit::Command)| {
+    let with = |change: fn(&mut Impedance)| {
         let mut command = full;
         change(&mut command);
         Command::Operation(command).encode(&Model::RS04, 0xFD, 1)
     };
     for change in [
-        |command: &mut mit::Command| command.position_rad = f32::NAN,
-        |command: &mut mit::Command| command.velocity_rad_per_s = f32::NAN,
-        |command: &mut mit::Command| command.kp = f32::NAN,
-        |command: &mut mit::Command| command.kd = f32::NAN,
-        |command: &mut mit::Command| command.torque_nm = f32::NAN,
+        |command: &mut Impedance| command.angle = Angle::from_radians(f32::NAN),
+        |command: &mut Impedance| command.velocity = AngularVelocity::from_rad_per_s(f32::NAN),
+        |command: &mut Impedance| command.stiffness = f32::NAN,
+        |command: &mut Impedance| command.damping = f32::NAN,
+        |command: &mut Impedance| command.torque_nm = f32::NAN,
     ] {
         assert_eq!(with(change), rest);
     }

@@ -12,7 +12,7 @@ pub use lk::LkDrive;
 pub use odrive::OdriveDrive;
 pub use rmd::RmdDrive;
 pub use robstride::RobStrideDrive;
-pub use vesc::{VescDrive, VescMotor};
+pub use vesc::VescDrive;
 
 use super::{Line, Sender, SimError, Simulation};
 use crate::frame::CanFrame;
@@ -53,19 +53,23 @@ impl Simulation {
     /// ```
     /// use drivetrain::frame::CanFrame;
     /// use drivetrain::lk::Model;
-    /// use drivetrain::sim::{Line, LkDrive, Simulation, VescDrive, VescMotor};
+    /// use drivetrain::encoder::GearRatio;
+    /// use drivetrain::sim::{Line, LkDrive, Simulation, VescDrive};
     /// use drivetrain::time::Duration;
+    /// use drivetrain::units::AngularVelocity;
+    /// use drivetrain::vesc;
     /// use embedded_can::nb::Can;
     ///
-    /// let motor = VescMotor {
+    /// let model = vesc::Model {
+    ///     name: "wheel",
     ///     pole_pairs: 7,
-    ///     gear: 1.0,
+    ///     gear: GearRatio::DIRECT,
     ///     torque_constant_nm_per_a: 0.05,
-    ///     current_max_a: 40.0,
-    ///     no_load_rad_per_s: 600.0,
+    ///     current_limit_a: 40.0,
+    ///     max_velocity: AngularVelocity::from_rad_per_s(600.0),
     /// };
     /// let mut yaw = LkDrive::of(Model::MF9025_16T, 1);
-    /// let mut shooter = VescDrive::new(23, motor).with_status_hz(500.0);
+    /// let mut shooter = VescDrive::of(model, 23).with_status_hz(500.0);
     ///
     /// let world = Simulation::new(7);
     /// let torque = CanFrame::standard(0x141, [0xA1, 0, 0, 0, 100, 0, 0, 0]).ok_or("id")?;
@@ -221,10 +225,12 @@ fn float(bits: u32) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{Drive, *};
+    use crate::encoder::GearRatio;
     use crate::sim::Fault;
     use crate::time::Instant;
-    use crate::{damiao, lk, robstride};
+    use crate::units::AngularVelocity;
+    use crate::{damiao, lk, robstride, vesc};
     use core::iter;
     use embedded_can::nb::Can;
     use embedded_can::{ExtendedId, Frame, Id, StandardId};
@@ -266,12 +272,13 @@ mod tests {
 
     const MS: Duration = Duration::from_millis(1);
 
-    const VESC: VescMotor = VescMotor {
+    const VESC: vesc::Model = vesc::Model {
+        name: "wheel",
         pole_pairs: 7,
-        gear: 1.0,
+        gear: GearRatio::DIRECT,
         torque_constant_nm_per_a: 0.05,
-        current_max_a: 40.0,
-        no_load_rad_per_s: 600.0,
+        current_limit_a: 40.0,
+        max_velocity: AngularVelocity::from_rad_per_s(600.0),
     };
 
     #[test]
@@ -280,7 +287,7 @@ mod tests {
         let mut lk = LkDrive::of(lk::Model::MF9025_16T, 1);
         let mut rmd = RmdDrive::new(2, 2.4);
         let mut robstride = RobStrideDrive::of(robstride::Model::RS02, 1);
-        let mut vesc = VescDrive::new(23, VESC);
+        let mut vesc = VescDrive::of(VESC, 23);
         let mut odrive = OdriveDrive::new(3, true, 0.05, 1.0).with_periods(0.0, 0.0);
 
         let enable_damiao = standard(1, [0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFC]);
@@ -393,7 +400,7 @@ mod tests {
     #[test]
     fn a_vesc_sends_its_status_frames_at_a_rate_and_none_at_delivery() {
         for (hz, rounds) in [(500.0, 500_usize), (300.0, 300), (0.0, 0), (-1.0, 0), (f32::NAN, 0)] {
-            let mut drive = VescDrive::new(23, VESC).with_status_hz(hz);
+            let mut drive = VescDrive::of(VESC, 23).with_status_hz(hz);
             let mut packets = Vec::new();
             for _ in 0..4_000 {
                 drive.step(0.000_25);
@@ -403,7 +410,7 @@ mod tests {
             assert!(rounds.abs_diff(packets.len() / 3) <= 1, "{hz} Hz: {}", packets.len());
             assert!(packets.chunks(3).all(|round| round == [27, 16, 9]), "{hz} Hz");
         }
-        assert!(iter::from_fn(|| VescDrive::new(23, VESC).next_frame()).next().is_none());
+        assert!(iter::from_fn(|| VescDrive::of(VESC, 23).next_frame()).next().is_none());
     }
 
     /// Found by fuzzing: a range of torques below zero, and limits that are no numbers, ended the simulation.

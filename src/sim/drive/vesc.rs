@@ -7,6 +7,7 @@
 
 use super::{Drive, DriveShaft, within};
 use crate::frame::CanFrame;
+use crate::vesc::Model;
 use core::f64::consts::TAU;
 use embedded_can::{ExtendedId, Frame, Id};
 
@@ -22,21 +23,6 @@ const LEAST_SPEED: f64 = 900.0;
 /// Packets of the status frames that a drive sends by itself, the last one first: status 1, 4 and 5.
 const STATUSES: [u8; 3] = [9, 16, 27];
 
-/// The motor behind a simulated VESC.
-#[derive(Debug, Clone, Copy)]
-pub struct VescMotor {
-    /// Pole pairs of the rotor.
-    pub pole_pairs: u8,
-    /// Turns of the rotor per turn of the output shaft.
-    pub gear: f64,
-    /// Torque constant of the rotor, in Nm/A.
-    pub torque_constant_nm_per_a: f64,
-    /// The drive's own current limit in A.
-    pub current_max_a: f64,
-    /// The velocity of the output shaft without load at a duty of 1, in rad/s.
-    pub no_load_rad_per_s: f64,
-}
-
 /// A VESC with its shaft, for tests: takes frames, answers requests for its fault code, and moves.
 ///
 /// [`Simulation::advance_drives`](crate::sim::Simulation::advance_drives) puts the drive on a bus. The drive sends status frames by itself
@@ -45,16 +31,20 @@ pub struct VescMotor {
 ///
 /// # Examples
 /// ```
-/// use drivetrain::sim::{Drive, VescDrive, VescMotor};
+/// use drivetrain::encoder::GearRatio;
+/// use drivetrain::sim::{Drive, VescDrive};
+/// use drivetrain::units::AngularVelocity;
+/// use drivetrain::vesc::Model;
 ///
-/// let motor = VescMotor {
+/// let model = Model {
+///     name: "wheel",
 ///     pole_pairs: 7,
-///     gear: 1.0,
+///     gear: GearRatio::DIRECT,
 ///     torque_constant_nm_per_a: 0.05,
-///     current_max_a: 40.0,
-///     no_load_rad_per_s: 600.0,
+///     current_limit_a: 40.0,
+///     max_velocity: AngularVelocity::from_rad_per_s(600.0),
 /// };
-/// let mut drive = VescDrive::new(23, motor).with_status_hz(500.0);
+/// let mut drive = VescDrive::of(model, 23).with_status_hz(500.0);
 /// assert_eq!(drive.next_frame(), None);
 /// drive.step(0.002);
 /// let packets = core::iter::from_fn(|| drive.next_frame()).map(|status| status.header() >> 8 & 0xFF);
@@ -63,7 +53,9 @@ pub struct VescMotor {
 #[derive(Debug, Clone, Copy)]
 pub struct VescDrive {
     id: u8,
-    motor: VescMotor,
+    model: Model,
+    /// The drive's own limit.
+    current_max_a: f64,
     command: Command,
     fault: u8,
     /// Rest of the time in which commands are ignored.
@@ -96,13 +88,14 @@ enum Command {
 }
 
 impl VescDrive {
-    /// Makes a drive at rest at 0, with a time-out of 1 s, a time-out brake current of 0, no status frames, as at delivery, and an inertia of
+    /// Makes a drive at rest at 0, with the model's current limit as its own limit, a time-out of 1 s, a time-out brake current of 0, no status frames, as at delivery, and an inertia of
     /// 0.01 kg m².
     #[must_use]
-    pub fn new(id: u8, motor: VescMotor) -> Self {
+    pub fn of(model: Model, id: u8) -> Self {
         Self {
             id,
-            motor,
+            model,
+            current_max_a: model.current_limit_a.into(),
             command: Command::Current(0.0),
             fault: 0,
             ignores_s: 0.0,
@@ -117,6 +110,12 @@ impl VescDrive {
             held_rad: 0.0,
             shaft: DriveShaft::new(0.01, 0.001),
         }
+    }
+
+    /// Sets the drive's own current limit in A.
+    #[must_use]
+    pub fn with_current_max(self, current_a: f32) -> Self {
+        Self { current_max_a: current_a.into(), ..self }
     }
 
     /// Sets the time-out in s, 0 for never, and its brake current in A.
@@ -190,14 +189,14 @@ impl VescDrive {
     /// Returns a status frame by its packet: 9, 14, 15, 16, 27 or 58; `None` for any other.
     #[must_use]
     pub fn report(&self, packet: u8) -> Option<CanFrame> {
-        let electrical = self.motor.gear * f64::from(self.motor.pole_pairs);
+        let electrical = self.gear() * f64::from(self.model.pole_pairs);
         let word = |value: f64| u64::from((value as i16).cast_unsigned());
         let wide = |value: f64| u64::from((value as i32).cast_unsigned());
         let bits = match packet {
             9 => {
                 let erpm = self.shaft.velocity_rad_per_s * electrical * 60.0 / TAU;
                 let current = self.shaft.torque_nm / self.nm_per_a();
-                let duty = self.shaft.velocity_rad_per_s / self.motor.no_load_rad_per_s;
+                let duty = self.shaft.velocity_rad_per_s / self.no_load_rad_per_s();
                 wide(erpm) << 32 | word(current * 10.0) << 16 | word(duty * 1e3)
             }
             14 | 15 => 0,
@@ -218,15 +217,22 @@ impl VescDrive {
         Some(CanFrame::of(id, bits.to_be_bytes()))
     }
 
+    fn gear(&self) -> f64 {
+        self.model.gear.as_f32().into()
+    }
+
+    fn no_load_rad_per_s(&self) -> f64 {
+        self.model.max_velocity.as_rad_per_s().into()
+    }
+
     fn nm_per_a(&self) -> f64 {
-        self.motor.gear * self.motor.torque_constant_nm_per_a
+        self.gear() * f64::from(self.model.torque_constant_nm_per_a)
     }
 
     fn wanted_nm(&self) -> f64 {
         let shaft = &self.shaft;
-        let erpm = |velocity: f64| {
-            velocity * self.motor.gear * f64::from(self.motor.pole_pairs) * 60.0 / TAU
-        };
+        let erpm =
+            |velocity: f64| velocity * self.gear() * f64::from(self.model.pole_pairs) * 60.0 / TAU;
         match self.command {
             Command::Current(current) | Command::Brake(current) | Command::Handbrake(current)
                 if current.abs() < LEAST_CURRENT =>
@@ -243,7 +249,7 @@ impl VescDrive {
                 let velocity = 20.0 * (self.held_rad - shaft.angle_rad);
                 within(shaft.following_nm(velocity), most)
             }
-            Command::Duty(duty) => shaft.following_nm(duty * self.motor.no_load_rad_per_s),
+            Command::Duty(duty) => shaft.following_nm(duty * self.no_load_rad_per_s()),
             Command::Speed(speed) if speed.abs() < LEAST_SPEED => 0.0,
             Command::Speed(speed) => shaft.following_nm(speed / erpm(1.0)),
             Command::Position(degrees) => {
@@ -275,7 +281,7 @@ impl Drive for VescDrive {
         let from = if packet == 1 && data.len() >= 6 { 2 } else { 0 };
         let bytes = data.get(from..)?.first_chunk::<4>()?;
         let value = f64::from(i32::from_be_bytes(*bytes));
-        let limit = self.motor.current_max_a;
+        let limit = self.current_max_a;
         let command = match packet {
             0 => Command::Duty(value / 1e5),
             1 => Command::Current(value / 1e3),
@@ -311,7 +317,7 @@ impl Drive for VescDrive {
             self.follow(Command::Brake(self.timeout_brake_a));
         }
         let current = self.wanted_nm() / self.nm_per_a();
-        let most = self.motor.current_max_a;
+        let most = self.current_max_a;
         self.shaft.step(within(current, most) * self.nm_per_a(), dt_s);
     }
 

@@ -3,8 +3,8 @@
 use super::{ALL, JUMP, LAST, Slot, Standing};
 use crate::encoder::Homing;
 use crate::motor::{Condition, Health, Link, MotorName, Reaction};
+use crate::snake::Register;
 use crate::snake::model::{FASTEST, PULSES_PER_TURN};
-use crate::snake::{Register, Reply};
 use crate::time::{Duration, Edge, Instant};
 
 /// A joint that moves less than this stands.
@@ -16,19 +16,19 @@ const THERE: u32 = PULSES_PER_TURN.unsigned_abs() / 64;
 impl Slot {
     /// Takes a reply received at `now`. Every reply is kept, but only a position is a sign of life: only the position changes without the
     /// attention of the controller.
-    pub(in crate::snake) fn receive(&mut self, reply: Reply, now: Instant) {
-        match reply.register() {
-            Register::ActualPosition => self.receive_position(reply.value(), now),
-            Register::ActualSpeed => self.raw_speed = reply.value(),
-            Register::Enable if is_up(self) && reply.value() == 0 => {
+    pub(in crate::snake) fn receive(&mut self, (register, value): (Register, i32), now: Instant) {
+        match register {
+            Register::ActualPosition => self.receive_position(value, now),
+            Register::ActualSpeed => self.raw_speed = value,
+            Register::Enable if is_up(self) && value == 0 => {
                 self.resets = self.resets.saturating_add(1);
                 self.distrust(now);
             }
             _ => {}
         }
-        if self.question == Some(reply.register()) {
+        if self.question == Some(register) {
             self.question = None;
-            self.answer = Some(reply);
+            self.answer = Some((register, value));
         }
     }
 

@@ -28,7 +28,7 @@ fn frame(id: u8, data: &[u8]) -> CanFrame {
 }
 
 fn reply(id: u8, register: Register, value: i32) -> CanFrame {
-    frame(id, &Reply::new(register, value).encode())
+    frame(id, &register.reply(value))
 }
 
 /// Joints that answer at once, with drives that stand where they are told to stand.

@@ -13,7 +13,7 @@ fn replies_are_sorted_by_their_register() {
     assert_eq!(bench.joints.answer(bench.handles[0]), None);
     bench.run(4);
     let answer = bench.joints.answer(bench.handles[0]);
-    assert_eq!(answer, Some(Reply::new(Register::Deceleration, 77)));
+    assert_eq!(answer, Some((Register::Deceleration, 77)));
     assert_eq!((bench.state(0).pulses, bench.joints.answer(bench.handles[0])), (-7, None));
 }
 

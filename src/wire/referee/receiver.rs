@@ -97,16 +97,21 @@ impl Referee {
     pub fn read(&mut self, input: &mut &[u8], now: Instant) -> Option<RefereeMessage> {
         let message = self.decoder.read(input)?;
         match message {
-            RefereeMessage::Robot(state) => {
-                self.limit_w.note(state.chassis_power_limit_w, self.highest_limit_w, now);
-                self.heat_limit.note(state.barrel_heat_limit, HIGHEST_HEAT, now);
-                self.cooling_per_s.note(state.barrel_cooling_per_s, HIGHEST_HEAT, now);
+            RefereeMessage::Robot {
+                chassis_power_limit_w,
+                barrel_heat_limit,
+                barrel_cooling_per_s,
+                ..
+            } => {
+                self.limit_w.note(chassis_power_limit_w, self.highest_limit_w, now);
+                self.heat_limit.note(barrel_heat_limit, HIGHEST_HEAT, now);
+                self.cooling_per_s.note(barrel_cooling_per_s, HIGHEST_HEAT, now);
             }
-            RefereeMessage::Power(power) => {
-                self.buffer_j.note(power.buffer_energy_j, MOST_BUFFER_J, now);
-                self.heat_17mm = power.heat_17mm;
+            RefereeMessage::Power { buffer_energy_j, heat_17mm, .. } => {
+                self.buffer_j.note(buffer_energy_j, MOST_BUFFER_J, now);
+                self.heat_17mm = heat_17mm;
             }
-            RefereeMessage::Shot(_) | RefereeMessage::Raw(_) => {}
+            RefereeMessage::Shot { .. } | RefereeMessage::Raw { .. } => {}
         }
         Some(message)
     }

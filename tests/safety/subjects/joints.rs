@@ -3,7 +3,7 @@
 use super::*;
 use drivetrain::encoder::Position;
 use drivetrain::motor::{CanDevice, Devices};
-use drivetrain::snake::{self, Command, Joint, Joints, Register, Reply};
+use drivetrain::snake::{self, Command, Joint, Joints, Register};
 use drivetrain::time::Duration;
 use drivetrain::units::Angle;
 use embedded_can::Frame;
@@ -33,7 +33,7 @@ impl Subject<1> for Snake {
 
     fn hear(&mut self, now: Instant) {
         let id = embedded_can::StandardId::new(5).unwrap();
-        let reply = Reply::new(Register::ActualPosition, 0).encode();
+        let reply = Register::ActualPosition.reply(0);
         _ = self.0.ingest(&CanFrame::new(id, &reply).unwrap(), now);
     }
     fn link(&self) -> [Link; 1] {

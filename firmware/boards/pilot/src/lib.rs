@@ -26,9 +26,9 @@ use drivetrain::time::{Duration, Edge, Instant, Tick};
 use drivetrain::units::{AngularVelocity, Current};
 use drivetrain::wire::dbus::{Dbus, Remote};
 use drivetrain::wire::hipnuc::{Imu, MAX_FRAME};
-use drivetrain::wire::parameters::{Parameter, ParameterCounts, Parameters};
+use drivetrain::wire::parameters::{Parameter, Parameters};
 use drivetrain::wire::vofa::justfloat;
-use drivetrain::wire::{Receiver, Silence};
+use drivetrain::wire::{Counts, Receiver, Silence};
 use gesture::{Gesture, at_rest};
 
 /// The robot that is driven: its mass, wheels and motors, from which the gains follow. The example `tune` measures better ones.
@@ -115,7 +115,7 @@ impl Pilot {
         bus: &mut Bus,
         mut bytes: &[u8],
         now: Instant,
-    ) -> ParameterCounts {
+    ) -> Counts {
         while self.parameters.read(&mut bytes, now).is_some() {
             let (kp, ki, kd) = self.gains(now);
             for wheel in self.wheels.into_array() {
@@ -132,11 +132,11 @@ impl Pilot {
         let speed = bus.state(self.wheels.front_left).map_or(0.0, |state| state.velocity.as_rpm());
         let (kp, ki, _) = self.gains(now);
         let counts = self.parameters.counts();
-        let refused = [counts.out_of_range, counts.unknown, counts.malformed];
-        let refused = refused.into_iter().map(f32::from).sum();
+        let refused = [counts.content_errors, counts.foreign_frames, counts.length_errors];
+        let refused = refused.iter().sum::<u32>() as f32;
         let mut frame = [0; CURVES_BYTES];
         // Refused for a buffer that is too small only, and this one is not.
-        _ = justfloat(&[speed, kp, ki, f32::from(counts.accepted), refused], &mut frame);
+        _ = justfloat(&[speed, kp, ki, counts.frames as f32, refused], &mut frame);
         frame
     }
 

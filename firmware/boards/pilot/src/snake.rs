@@ -137,9 +137,10 @@ impl Snake {
 
     /// Sets the targets. Those of motors that are not armed are refused, which is harmless.
     pub fn follow(&self, (joints, bus): &mut Motors, command: &HostCommand) {
-        for (joint, target) in self.joints.into_iter().zip(&command.joints) {
-            _ = joints.set_speed(joint, AngularVelocity::from_rpm(target.speed_rpm.into()));
-            _ = joints.set_pulses(joint, target.position_pulses);
+        let targets = command.speeds_rpm.into_iter().zip(command.positions_pulses);
+        for (joint, (rpm, pulses)) in self.joints.into_iter().zip(targets) {
+            _ = joints.set_speed(joint, AngularVelocity::from_rpm(rpm.into()));
+            _ = joints.set_pulses(joint, pulses);
         }
         let position = |degrees: i16| Position::from_angle(Angle::from_degrees(degrees.into()));
         _ = bus.set_position(self.yaw, position(command.gm6020_position));

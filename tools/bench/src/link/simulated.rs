@@ -3,13 +3,16 @@
 use super::{Heard, Taken};
 use crate::drive::{MOTOR_NM_PER_A, master_id};
 use crate::motors::{Model, Spec};
+use drivetrain::encoder::GearRatio;
 use drivetrain::frame::CanFrame;
 use drivetrain::odrive::Firmware;
 use drivetrain::sim::{
     DamiaoDrive, Drive, DriveShaft, Fault, Line, LkDrive, MotorConfig, MotorKey, OdriveDrive,
-    RmdDrive, RobStrideDrive, Simulation, VescDrive, VescMotor,
+    RmdDrive, RobStrideDrive, Simulation, VescDrive,
 };
 use drivetrain::time::{Duration, Instant};
+use drivetrain::units::AngularVelocity;
+use drivetrain::vesc;
 use embedded_can::{Error as _, nb::Can};
 
 /// The bus of the robot.
@@ -176,14 +179,15 @@ fn kind(spec: Spec) -> Option<Kind> {
             Kind::Odrive(drive.with_shaft(shaft(0.35)))
         }
         Model::Vesc(pole_pairs) => {
-            let motor = VescMotor {
+            let motor = vesc::Model {
+                name: "VESC",
                 pole_pairs,
-                gear: 1.0,
-                torque_constant_nm_per_a: MOTOR_NM_PER_A.into(),
-                current_max_a: 60.0,
-                no_load_rad_per_s: 600.0,
+                gear: GearRatio::DIRECT,
+                torque_constant_nm_per_a: MOTOR_NM_PER_A,
+                current_limit_a: 60.0,
+                max_velocity: AngularVelocity::from_rad_per_s(600.0),
             };
-            let drive = VescDrive::new(id, motor).with_timeout(0.1, 0.0).with_status_hz(500.0);
+            let drive = VescDrive::of(motor, id).with_timeout(0.1, 0.0).with_status_hz(500.0);
             Kind::Vesc(drive.with_shaft(shaft(0.35)))
         }
         Model::M3508 | Model::M2006 | Model::Gm6020 | Model::Gm6020Current => return None,

@@ -1,6 +1,7 @@
 //! Counts of a session, by name.
 
 use super::Session;
+use embedded_can::ErrorKind;
 
 impl Session {
     /// Counts of the runner and of the DJI bus, by name.
@@ -11,7 +12,7 @@ impl Session {
             ("taken", s.taken),
             ("unrelated", s.unrelated),
             ("malformed", s.malformed),
-            ("receive_errors", s.receive_errors.total()),
+            ("receive_errors", s.receive_errors()),
             ("bad_length", bus.bad_length),
             ("bad_field", bus.bad_field),
             ("unattached", bus.unattached),
@@ -20,7 +21,7 @@ impl Session {
             ("offered", s.offered),
             ("sent", s.sent),
             ("refused", s.refused),
-            ("send_errors", s.send_errors.total()),
+            ("send_errors", s.send_errors()),
             ("bus_losses", s.bus_losses),
         ];
         counts.map(|(name, count)| (name, count.into())).into()
@@ -29,16 +30,19 @@ impl Session {
     /// Errors of receiving and sending, by the kinds of `embedded-can`.
     pub(crate) fn errors(&mut self) -> Vec<(&'static str, u64)> {
         let statistics = self.runner.statistics();
-        let (heard, sent) = (statistics.receive_errors, statistics.send_errors);
         let kinds = [
-            ("overrun", heard.overrun, sent.overrun),
-            ("bit", heard.bit, sent.bit),
-            ("stuff", heard.stuff, sent.stuff),
-            ("crc", heard.crc, sent.crc),
-            ("form", heard.form, sent.form),
-            ("acknowledge", heard.acknowledge, sent.acknowledge),
-            ("other", heard.other, sent.other),
+            ("overrun", ErrorKind::Overrun),
+            ("bit", ErrorKind::Bit),
+            ("stuff", ErrorKind::Stuff),
+            ("crc", ErrorKind::Crc),
+            ("form", ErrorKind::Form),
+            ("acknowledge", ErrorKind::Acknowledge),
+            ("other", ErrorKind::Other),
         ];
-        kinds.map(|(name, heard, sent)| (name, u64::from(heard) + u64::from(sent))).into()
+        let count = |kind| {
+            u64::from(statistics.receive_errors_of(kind))
+                + u64::from(statistics.send_errors_of(kind))
+        };
+        kinds.map(|(name, kind)| (name, count(kind))).into()
     }
 }
