@@ -4,17 +4,17 @@ use crate::opaque::{Function, any};
 use core::hint::black_box;
 use drivetrain::control::{Differentiator, Pid, PidConfig, WheelTuning, fhan};
 use drivetrain::dji::{
-    AnyHandle, AttachError, Bus, Config, Facts, Feedback, Gm6020Current,
-    Gm6020Voltage, Handle, M2006, M3508, Message, WordGains,
+    AnyHandle, AttachError, Bus, Config, Facts, Feedback, Gm6020Current, Gm6020Voltage, Handle,
+    M2006, M3508, Message, WordGains,
 };
 use drivetrain::encoder::{GearRatio, Homing, Position, Shaft, resolve_gap, shortest};
 use drivetrain::error::ConfigError;
 use drivetrain::frame::CanFrame;
 use drivetrain::math::{atan2, sin_cos, sqrt, wrap, wrap_pi, wrap_positive, wrap_tau};
 use drivetrain::motor::{
-    AngleDrive, BusLoad, CanDevice, Capabilities, Capability, Claim, Devices, Guard, Ingest,
-    Measured, Missing, MotorName, Order, Own, OwnMotor, Role, StopHoming, Timeouts, VelocityDrive,
-    Visitor, Vitals, WrongSetting,
+    AngleDrive, ArmingSwitch, BusLoad, CanDevice, Capabilities, Capability, Claim, Devices, Guard,
+    Ingest, Measured, Missing, MotorName, Order, Own, OwnMotor, Role, StopHoming, Timeouts,
+    VelocityDrive, Visitor, Vitals, WrongSetting,
 };
 use drivetrain::runner::{
     BlockingTx, EmergencyStop, FrameQueue, FrameReceiver, FrameSender, Nb, Runner, Statistics,
@@ -235,6 +235,8 @@ fn motor() {
     (|names: [MotorName; 20]| Missing::collect(names.into_iter())).call();
     (|missing: &Missing| Missing::names(missing).count()).call();
     Missing::total.call();
+    ArmingSwitch::new.call();
+    (|switch: &mut ArmingSwitch, is_on: Option<bool>| ArmingSwitch::read(switch, is_on)).call();
     Missing::full_bus.call();
     (|id: Id, role: Role, motor: MotorName| Claim::new(id, role, motor)).call();
     Claim::with_mask.call();

@@ -39,6 +39,7 @@ pub fn call_all() {
     Dbus::is_live.call();
     Dbus::edge.call();
     Dbus::counts.call();
+    Switch::is_at.call();
     (|dbus: &mut Dbus, input: &mut &'static [u8], now| Dbus::read(dbus, input, now)).call();
     Keys::contains.call();
     Deframer::<Status, 64>::new.call();

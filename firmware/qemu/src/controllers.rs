@@ -6,8 +6,8 @@ use crate::rows::swinging;
 use core::hint::black_box;
 use drivetrain::chassis::Odometry;
 use drivetrain::control::{
-    Biquad, Cascade, Differentiator, Identification, LoadObserver, LowPass,
-    MotionLimits, Pid, PidConfig, Plant, PositionActuator, Profile, ProfileState, RelayTuner, SlewLimiter,
+    Biquad, Cascade, Differentiator, Identification, LoadObserver, LowPass, MotionLimits, Pid,
+    PidConfig, Plant, PositionActuator, Profile, ProfileState, RelayTuner, SlewLimiter,
     SpeedActuator, StepResponse, Window,
 };
 use drivetrain::error::ConfigError;

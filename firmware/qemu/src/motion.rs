@@ -43,7 +43,8 @@ impl Random {
         let moving = if call % 4 < 2 { 0.0 } else { self.number() };
         let (top, steep, jerk) = (1.2 + self.number(), 3.0 + 2.5 * self.number(), 15.0);
         let from = ProfileState { position, velocity, acceleration: 4.0 * acceleration };
-        let to = ProfileState { position: position + way, velocity: moving, ..ProfileState::default() };
+        let to =
+            ProfileState { position: position + way, velocity: moving, ..ProfileState::default() };
         (from, to, MotionLimits::new(top, steep).with_jerk(jerk + 14.0 * self.number()))
     }
 
