@@ -187,7 +187,7 @@ pub enum RefereeMessage {
         /// Number of bytes of data.
         length: u8,
         /// The data, and zeros up to [`MAX_DATA`] bytes.
-        padded: [u8; MAX_DATA],
+        data: [u8; MAX_DATA],
     },
 }
 
@@ -196,7 +196,7 @@ impl RefereeMessage {
         let length = u8::try_from(data.len()).ok()?;
         let mut padded = [0; MAX_DATA];
         padded.get_mut(..data.len())?.copy_from_slice(data);
-        Some(Self::Raw { command, length, padded })
+        Some(Self::Raw { command, length, data: padded })
     }
 
     /// Returns the number of the command and the data, 0 to [`MAX_DATA`] bytes, of a message whose data is not read here; `None` for any
@@ -204,8 +204,8 @@ impl RefereeMessage {
     #[must_use]
     pub fn as_raw(&self) -> Option<(u16, &[u8])> {
         match self {
-            Self::Raw { command, length, padded } => {
-                Some((*command, padded.get(..usize::from(*length)).unwrap_or(&[])))
+            Self::Raw { command, length, data } => {
+                Some((*command, data.get(..usize::from(*length)).unwrap_or(&[])))
             }
             _ => None,
         }
