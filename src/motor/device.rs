@@ -136,7 +136,7 @@ pub enum Malformed {
     Field,
 }
 
-/// An action on every device of [`Devices`].
+/// An action on every device of [`Devices`](super::Devices).
 pub trait Visitor {
     /// Visits one device.
     fn visit(&mut self, device: &mut impl CanDevice);
