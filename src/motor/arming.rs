@@ -158,16 +158,6 @@ pub(crate) struct Obstacles {
 }
 
 impl Obstacles {
-    /// Nothing stands against arming one motor.
-    pub(crate) const NONE: Self = Self {
-        has_motors: true,
-        clash: None,
-        missing: Missing::NONE,
-        second_master: None,
-        faulty: Missing::NONE,
-        wrong_setting: None,
-    };
-
     /// Checks a request to arm. The reasons against arming come in this order, for all devices: the emergency stop, no motor, a clash of
     /// ids, another setting, missing feedback, a second master, a fault, a setting not known yet, and a request that is
     /// [not granted](crate::motor::safety::DeviceGuard::ask). If the stop is set, `survey` is not called.
@@ -182,7 +172,14 @@ impl Obstacles {
         if is_stopped {
             return Err(ArmError::Stopped);
         }
-        let mut found = Self::NONE;
+        let mut found = Self {
+            has_motors: true,
+            clash: None,
+            missing: Missing::NONE,
+            second_master: None,
+            faulty: Missing::NONE,
+            wrong_setting: None,
+        };
         survey(&mut found);
         found.refusal(granted)
     }
@@ -198,8 +195,8 @@ impl Obstacles {
         Self::check(is_stopped, granted, |found| found.missing.extend(missing.into_iter()))
     }
 
-    // In order, and by reference: a refusal has the size of twelve names.
-    #[inline(never)]
+    // Inlined, so that a program that looks at no names has no code for them.
+    #[inline]
     fn refusal(&self, granted: bool) -> Result<(), ArmError> {
         if !self.has_motors {
             return Err(ArmError::NoMotors);

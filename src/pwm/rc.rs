@@ -202,7 +202,7 @@ impl<P: SetDutyCycle> RcPwm<P> {
             guard,
             arming: Arming::Idle,
             throttle: 0.0,
-            may_repeat: Repeat::NO,
+            may_repeat: Repeat::ONCE,
         })
     }
 
@@ -250,7 +250,6 @@ impl<P: SetDutyCycle> RcPwm<P> {
     /// # Errors
     /// Names the reason of the refusal. A value that is NaN or infinite also removes the present target.
     pub fn set_throttle(&mut self, throttle: f32) -> Result<(), TargetError> {
-        self.may_repeat.end_without(self.guard.has_target());
         self.guard.admit(throttle.is_finite())?;
         self.throttle = throttle.clamp(-1.0, 1.0);
         Ok(())
@@ -270,7 +269,9 @@ impl<P: SetDutyCycle> RcPwm<P> {
             return self.go_on_arming(tick.now());
         }
         let is_hold = TimeStep::new(tick.dt_s(), ANY_STEP_S).is_hold();
-        if self.may_repeat.drives(drives, is_hold) {
+        // Each pulse is calculated from the present throttle: there is no command of an earlier target to repeat.
+        let may_act = self.may_repeat.drives(true, is_hold);
+        if drives && may_act {
             let pulse_us = self.pulse_us();
             self.send(pulse_us)
         } else if self.config.off_at_rest {

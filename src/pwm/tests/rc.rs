@@ -137,21 +137,19 @@ fn a_clock_that_stands_or_goes_back_gives_neutral() {
     }
 }
 
-/// As for every motor: once after a pulse of this target, and never before one.
+/// As for every motor: one update, and no second one.
 #[test]
-fn an_update_without_a_step_repeats_a_pulse_once_and_gives_none_first() {
+fn an_update_without_a_step_gives_a_pulse_once() {
     let log = Log::default();
     let mut esc = armed(&log, RcConfig::at_once());
-    let mut pulse = |ms: u64, dt_s: f32, throttle: Option<f32>| {
-        throttle.into_iter().for_each(|throttle| esc.set_throttle(throttle).unwrap());
+    let mut pulse = |ms: u64, dt_s: f32| {
+        esc.set_throttle(1.0).unwrap();
         esc.update(Tick::new(at_ms(ms), dt_s)).unwrap();
         last(&log)
     };
-    assert_eq!(pulse(6, 0.0, Some(1.0)), 1_500, "no pulse to repeat");
-    assert_eq!(pulse(7, 0.001, None), 2_000);
-    assert_eq!(pulse(8, 0.0, None), 2_000);
-    assert_eq!([pulse(9, f32::NAN, None), pulse(10, 0.0, Some(1.0))], [1_500, 1_500]);
-    assert_eq!(pulse(11, 0.001, None), 2_000);
+    assert_eq!([pulse(6, 0.001), pulse(7, 0.0)], [2_000, 2_000]);
+    assert_eq!([pulse(8, f32::NAN), pulse(9, 0.0)], [1_500, 1_500]);
+    assert_eq!(pulse(10, 0.001), 2_000);
 }
 
 #[test]
