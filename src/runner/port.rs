@@ -278,6 +278,7 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
         evicted: &mut dyn FnMut(&CanFrame),
     ) {
         let yields = if is_later { None } else { self.pending.yields.take() };
+        let goes_last = |frame: &CanFrame| yields.is_some_and(|key| key.fits(frame.header()));
         let (mut held, mut goes_first, mut refused) = (None, None, None);
         let mut is_first = sent == 0 && !is_later;
         // Evicted by this call, and not offered again by it.
@@ -289,10 +290,7 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
                 Some(offered) => offered,
                 None => {
                     let frame = match self.device.next_frame(self.turn) {
-                        Some(frame)
-                            if yields.is_some_and(|it| it.fits(frame.header()))
-                                && held.is_none() =>
-                        {
+                        Some(frame) if goes_last(&frame) && held.is_none() => {
                             held = Some(frame);
                             continue;
                         }
