@@ -94,15 +94,6 @@ pub struct Pid {
 
 const _: () = assert!(size_of::<Pid>() <= 92, "one for each motor of a bus");
 
-/// The terms of the last output.
-#[derive(Debug, Default, Clone, Copy, PartialEq)]
-pub(crate) struct Terms {
-    pub(crate) p: f32,
-    pub(crate) i: f32,
-    pub(crate) d: f32,
-    pub(crate) feed_forward: f32,
-}
-
 impl Pid {
     /// Takes and checks the configuration.
     ///
@@ -201,14 +192,13 @@ impl Pid {
     /// Names the parameter as [`new`](Self::new) does; then nothing changes.
     pub fn set_config(&mut self, config: PidConfig) -> Result<(), ConfigError> {
         config.validate()?;
-        let sum = |terms: Terms| terms.p + terms.i + terms.d + terms.feed_forward;
-        let before = self.terms();
-        let last = sum(before);
+        let sum = |pid: &Self, d| pid.proportional() + pid.integral() + d + pid.feed_forward();
+        let before = self.derivative();
+        let last = sum(self, before);
         let held = self.core.within_output_range(last);
         self.store(&config);
-        let after = self.terms();
-        let d = if config.incremental { after.d } else { before.d };
-        let change = finite(held - sum(Terms { d, ..after }));
+        let d = if config.incremental { self.derivative() } else { before };
+        let change = finite(held - sum(self, d));
         // Towards the limit, the memory would be wound up.
         let change = if (last - held) * change < 0.0 { 0.0 } else { change };
         let limit = if self.core.has_memory() { config.integral_limit } else { 0.0 };
@@ -235,7 +225,8 @@ impl Pid {
     /// ```
     #[must_use]
     pub fn proportional(&self) -> f32 {
-        self.terms().p
+        let (error, p) = (self.core.error, &self.core.parameters);
+        if error != UNKNOWN && error.abs() >= p.dead_band { p.kp * error } else { 0.0 }
     }
 
     /// Returns the integral term of the last output, within its limit; the memory of the incremental form.
@@ -249,27 +240,15 @@ impl Pid {
     /// Returns the derivative term of the last output: `-kd` times the rate of the measurement, filtered if configured.
     #[must_use]
     pub fn derivative(&self) -> f32 {
-        self.terms().d
+        -(self.core.parameters.kd * self.core.rate)
     }
 
     /// Returns the feed-forward term of the last output: `kS sign(setpoint) + kV setpoint`; on a circle for the setpoint next to the
     /// measurement.
     #[must_use]
     pub fn feed_forward(&self) -> f32 {
-        self.terms().feed_forward
-    }
-
-    pub(crate) fn terms(&self) -> Terms {
-        let (core, p) = (&self.core, &self.core.parameters);
-        let counts = core.error != UNKNOWN && core.error.abs() >= p.dead_band;
         let is_measured = self.measurement != UNKNOWN;
-        let setpoint = if is_measured { self.measurement + core.error } else { 0.0 };
-        Terms {
-            p: if counts { p.kp * core.error } else { 0.0 },
-            i: core.integral,
-            d: -(p.kd * core.rate),
-            feed_forward: self.feed_forward_of(setpoint),
-        }
+        self.feed_forward_of(if is_measured { self.measurement + self.core.error } else { 0.0 })
     }
 
     /// Returns the last output; before the first call zero, or the value given to [`reset_to`](Self::reset_to).
@@ -305,7 +284,7 @@ impl Pid {
         self.core.integral = limited(self.core.integral, lowest, highest);
     }
 
-    /// Returns the feed-forward, as far as [`terms`](Self::terms) knows the setpoint too: as `measurement + error`.
+    /// Returns the feed-forward, as far as [`feed_forward`](Self::feed_forward) knows the setpoint too: as `measurement + error`.
     const fn feed_forward_of(&self, setpoint: f32) -> f32 {
         self.velocity_gain * setpoint + friction(self.static_gain, setpoint)
     }
@@ -331,6 +310,26 @@ impl Pid {
 mod tests {
     use super::*;
     use crate::time::TimeStep;
+
+    /// The terms of the last output.
+    #[derive(Debug, Default, Clone, Copy, PartialEq)]
+    pub(crate) struct Terms {
+        pub(crate) p: f32,
+        pub(crate) i: f32,
+        pub(crate) d: f32,
+        pub(crate) feed_forward: f32,
+    }
+
+    impl Pid {
+        pub(crate) fn terms(&self) -> Terms {
+            Terms {
+                p: self.proportional(),
+                i: self.integral(),
+                d: self.derivative(),
+                feed_forward: self.feed_forward(),
+            }
+        }
+    }
     use proptest::prelude::*;
 
     const DT_S: f32 = 0.001;

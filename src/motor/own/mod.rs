@@ -304,15 +304,26 @@ impl<M: OwnMotor> Own<M> {
             return Ingest::Taken;
         }
         let gap_us = self.guard.gap_us(now);
-        let before = self.joint.depends_on_supply().then(|| self.reading());
+        let is_silence = gap_us.is_some_and(|gap_us| gap_us > SILENCE_US);
+        if is_silence || self.joint.depends_on_supply() {
+            return self.take_doubtfully(frame, gap_us, now);
+        }
         let outcome = self.motor.decode(frame);
         if outcome == Ingest::Taken {
             self.hear(gap_us, now);
-            let gap_us = gap_us.unwrap_or(0);
-            let jumps = |before: &Reading| before.jumps_to(&self.reading(), gap_us);
-            if gap_us > SILENCE_US || before.as_ref().is_some_and(jumps) {
-                self.start_anew(before, gap_us, now);
-            }
+        }
+        outcome
+    }
+
+    /// Takes feedback of a drive that may have started again.
+    #[cold]
+    #[inline(never)]
+    fn take_doubtfully(&mut self, frame: &CanFrame, gap_us: Option<u32>, now: Instant) -> Ingest {
+        let before = self.reading();
+        let outcome = self.motor.decode(frame);
+        if outcome == Ingest::Taken {
+            self.hear(gap_us, now);
+            self.compare_readings(&before, gap_us.unwrap_or(0), now);
         }
         outcome
     }
@@ -321,18 +332,17 @@ impl<M: OwnMotor> Own<M> {
         Reading(self.motor.angle(), self.motor.velocity())
     }
 
-    /// The drive may have started again: in a silence, unless feedback is late only after more, or before an angle that jumped. The joint
-    /// stays where it is, with its target; without its zero, it trips.
-    #[cold]
-    #[inline(never)]
-    fn start_anew(&mut self, before: Option<Reading>, gap_us: u32, now: Instant) {
+    /// The drive started again in a silence, unless feedback is late only after more, or before an angle that jumped. The joint stays where
+    /// it is, with its target; without its zero, it trips.
+    fn compare_readings(&mut self, before: &Reading, gap_us: u32, now: Instant) {
         let is_silence = gap_us > SILENCE_US && self.guard.is_late_by(gap_us);
         if is_silence {
             self.motor.forget_settings();
         }
         let after = self.reading();
-        let is_new = |before: &Reading| is_silence || before.jumps_to(&after, gap_us);
-        let Some(before) = before.filter(is_new) else { return };
+        if !is_silence && !before.jumps_to(&after, gap_us) {
+            return;
+        }
         if let Some(turns) = self.joint.doubt_zero(before.way_to(&after)) {
             self.target = self.target.moved(turns);
             self.start = self.start.map(|start| start + turns);

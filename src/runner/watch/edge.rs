@@ -207,6 +207,8 @@ pub(in crate::runner) struct FrameKey {
 
 impl FrameKey {
     /// Finds the command of a device to which a frame belongs.
+    #[cold]
+    #[inline(never)]
     pub(in crate::runner) fn of(device: &mut impl Devices, frame: &CanFrame) -> Self {
         let covers = |claim: &Claim| claim.role() == Role::Command && claim.covers(frame.id());
         let mask =
@@ -292,6 +294,7 @@ impl Watch {
         }
     }
 
+    #[inline(never)]
     fn unsent_of(&mut self, key: FrameKey) -> Option<&mut Unsent> {
         self.unsent.iter_mut().flatten().find(|unsent| unsent.key == key)
     }
