@@ -315,7 +315,8 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
                     self.count_sent(&frame);
                     let key = FrameKey::of(self.device, &other);
                     let is_older = key.fits(frame.header());
-                    let place = ids.get_mut(evictions).filter(|_| !is_older);
+                    let place = ids.get_mut(evictions);
+                    let place = place.filter(|_| other.header() != frame.header());
                     let waits = place.is_some() && self.device.put_back(&other);
                     if waits || self.device.requeue(&other) {
                         increment(&mut self.statistics.evicted);

@@ -116,6 +116,11 @@ impl Loader {
         }
     }
 
+    /// Sets how often a jam of one shot may be tried to clear.
+    pub(super) const fn allow_tries(&mut self, tries: u8) {
+        self.tries_allowed = tries;
+    }
+
     pub(super) const fn tries(&self) -> u8 {
         self.tries
     }

@@ -91,10 +91,11 @@ impl Shooter {
         chambers: u8,
         shots_per_s: f32,
     ) -> Result<Self, ConfigError> {
+        let config = ShooterConfig::new(wheels, chambers, shots_per_s);
         Self {
-            config: ShooterConfig::new(wheels, chambers, shots_per_s),
+            config,
             state: ShooterState::Rest,
-            loader: Loader::new(1, 0),
+            loader: Loader::new(chambers, config.tries),
             heat: Heat::new(),
             ordered: 0,
             is_released: false,
@@ -107,10 +108,7 @@ impl Shooter {
 
     const fn checked(self) -> Result<Self, ConfigError> {
         match self.config.validate() {
-            Ok(()) => {
-                let loader = Loader::new(self.config.chambers, self.config.tries);
-                Ok(Self { loader, ..self })
-            }
+            Ok(()) => Ok(self),
             Err(error) => Err(error),
         }
     }
@@ -144,8 +142,7 @@ impl Shooter {
     /// [`Jammed`](ShooterState::Jammed).
     #[must_use]
     pub const fn with_tries(mut self, tries: u8) -> Self {
-        self.config.tries = tries;
-        self.loader = Loader::new(self.config.chambers, tries);
+        self.loader.allow_tries(tries);
         self
     }
 

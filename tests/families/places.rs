@@ -10,9 +10,9 @@ use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{
     Controller, DamiaoDrive, Drive, DriveShaft, Fault, Line, RobStrideDrive, Sender, Simulation,
 };
-use drivetrain::time::{Duration, Instant};
+use drivetrain::time::{Duration, Instant, ManualClock};
 use drivetrain::units::AngularVelocity;
-use embedded_can::{Frame, Id, StandardId};
+use embedded_can::{ExtendedId, Frame, Id, StandardId};
 
 /// The driver of the simulator, which evicts the frame of the lowest priority; or refuses the fourth frame until it was polled.
 struct Driver<'w> {
@@ -140,4 +140,47 @@ fn a_cable_that_is_out_for_a_moment_is_no_bus_that_is_down() {
         assert!(runner.is_armed(), "period {period_us} us, {gap_ms} ms");
         assert!(runner.statistics().refused > 0, "the cable was not missed");
     }
+}
+
+/// Takes every frame but those of some types, whose bits are the highest five of an id of 29.
+struct Picky {
+    refused: [u32; 2],
+    received: Option<CanFrame>,
+}
+
+impl embedded_can::nb::Can for Picky {
+    type Frame = CanFrame;
+    type Error = embedded_can::ErrorKind;
+
+    fn transmit(&mut self, frame: &CanFrame) -> nb::Result<Option<CanFrame>, Self::Error> {
+        let Id::Extended(id) = frame.id() else { return Ok(None) };
+        if self.refused.contains(&(id.as_raw() >> 24)) {
+            return Err(nb::Error::WouldBlock);
+        }
+        Ok(None)
+    }
+
+    fn receive(&mut self) -> nb::Result<CanFrame, Self::Error> {
+        self.received.take().ok_or(nb::Error::WouldBlock)
+    }
+}
+
+/// Operation frames that leave must not hide questions that never do: both have the motor in one claim.
+#[test]
+fn a_question_that_never_leaves_beside_commands_that_do_is_a_bus_that_is_down() {
+    let clock = ManualClock::new(Instant::START);
+    let mode = ImpedanceControl::new(5.0).unwrap();
+    let motor = robstride::Motor::new(robstride::Model::RS02, 1, mode).unwrap();
+    let can = Picky { refused: [0x03, 0x11], received: None };
+    let mut runner = Runner::new(Nb(can), &clock, Own::new(motor));
+    for _ in 0..150 {
+        clock.advance(Duration::from_millis(1));
+        let feedback = [0x7F, 0xFF, 0x7F, 0xFF, 0x7F, 0xFF, 1, 0];
+        let id = ExtendedId::new(0x0200_01FD).unwrap();
+        runner.port_mut().0.received = Some(CanFrame::of(id, feedback));
+        runner.poll(16);
+        let tick = runner.due().unwrap();
+        runner.tick(tick);
+    }
+    assert!(runner.is_bus_down());
 }

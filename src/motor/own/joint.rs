@@ -4,24 +4,32 @@ use super::{Impedance, Own, OwnMotor, Target};
 use crate::motor::{AngleDrive, Capabilities, Capability, TargetError, VelocityDrive};
 use crate::units::{Angle, AngularVelocity};
 
-/// No shaft turns further between two frames than at the larger of both velocities, and this much, in rad and of that way.
-const WAY: (f32, f32) = (0.5, 0.5);
+/// A reading of the angle, with the stamp of its feedback.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Reading {
+    pub(super) angle: Angle,
+    pub(super) velocity: AngularVelocity,
+    pub(super) at: u32,
+}
 
-/// Angle and velocity of the shaft, as the drive reports them.
-pub(super) struct Reading(pub(super) Option<Angle>, pub(super) AngularVelocity);
+/// Feedback may have waited in a buffer for so long, in s.
+const WAITED_S: f32 = 0.04;
+/// After a longer time without an angle, in s, whole turns are not known.
+const UNKNOWN_S: f32 = 0.1;
 
 impl Reading {
-    /// Returns the way to a later reading.
-    pub(super) fn way_to(&self, later: &Self) -> Option<Angle> {
-        Some(later.0? - self.0?)
+    /// Returns the largest way in rad of the shaft to a later reading: at the larger of both velocities, for a little longer than the time
+    /// between them, and beside that 0.25 rad, and 8 rad/s for a shaft that sped up and stopped meanwhile.
+    fn furthest(&self, later: &Self) -> f32 {
+        let (one, other) = (self.velocity.as_rad_per_s(), later.velocity.as_rad_per_s());
+        let gap_s = self.gap_s(later).min(UNKNOWN_S);
+        // A velocity that is no number counts as none.
+        let fastest = one.abs().max(other.abs()).max(0.0);
+        0.25 + 8.0 * gap_s + 1.5 * fastest * gap_s.max(WAITED_S)
     }
 
-    /// Tells whether the angle of a later reading is further away than the shaft turned meanwhile: the drive counts anew.
-    pub(super) fn jumps_to(&self, later: &Self, gap_us: u32) -> bool {
-        let fastest = self.1.as_rad_per_s().abs().max(later.1.as_rad_per_s().abs());
-        let turned = fastest * gap_us as f32 * 1e-6;
-        self.way_to(later)
-            .is_some_and(|way| way.as_radians().abs() > turned + WAY.0 + WAY.1 * turned)
+    fn gap_s(&self, later: &Self) -> f32 {
+        later.at.wrapping_sub(self.at) as f32 * 1e-6
     }
 }
 
@@ -30,6 +38,8 @@ impl Reading {
 pub(super) struct Joint {
     pub(super) sign: f32,
     pub(super) zero: Zero,
+    /// The last angle of a drive whose zero depends on its supply.
+    last: Option<Reading>,
 }
 
 /// The angle of the drive where the joint is at zero.
@@ -49,7 +59,7 @@ pub(super) enum Zero {
 
 impl Joint {
     /// The joint turns and counts as its drive.
-    pub(super) const DIRECT: Self = Self { sign: 1.0, zero: Zero::OfDrive };
+    pub(super) const DIRECT: Self = Self { sign: 1.0, zero: Zero::OfDrive, last: None };
 
     /// Places a given zero in the turn where the joint is heard first.
     pub(super) fn place_zero(&mut self, measured: Option<Angle>) {
@@ -63,21 +73,39 @@ impl Joint {
         matches!(self.zero, Zero::Placed(_) | Zero::Found(_))
     }
 
-    /// The drive may have counted anew between two angles, `way` apart, in which the joint turned by less than half a turn. Returns by
-    /// how much the drive counts further than before; `None` if the zero is lost.
-    pub(super) fn doubt_zero(&mut self, way: Option<Angle>) -> Option<Angle> {
-        match (self.zero, way) {
-            (Zero::Placed(zero), Some(way)) => {
-                let turns = way - way.wrapped();
-                self.zero = Zero::Placed(zero + turns);
+    /// Takes the angle of a frame of feedback, after a silence or not. A drive counts anew if the angle is further away than the shaft can
+    /// have turned. Returns by how much the drive counts further than before; `None` if the zero is lost.
+    ///
+    /// A jump by whole turns is no loss: some drives count within a turn.
+    pub(super) fn follow(&mut self, reading: Option<Reading>, is_silence: bool) -> Option<Angle> {
+        let last = self.last;
+        self.last = reading.or(last);
+        let (reading, last) = match (reading, last) {
+            (Some(reading), Some(last)) => (reading, last),
+            _ if is_silence => return self.lose_zero(),
+            _ => return Some(Angle::ZERO),
+        };
+        let (way, furthest) = (reading.angle - last.angle, last.furthest(&reading));
+        let turns = way - way.wrapped();
+        let is_usual = |way: Angle| !is_silence && way.as_radians().abs() <= furthest;
+        match &mut self.zero {
+            _ if is_usual(way) => Some(Angle::ZERO),
+            _ if !is_silence && last.gap_s(&reading) > UNKNOWN_S => self.lose_zero(),
+            Zero::Placed(zero) => {
+                *zero = *zero + turns;
                 Some(turns)
             }
-            (Zero::Placed(_) | Zero::Found(_), _) => {
-                self.zero = Zero::Lost;
-                None
+            Zero::Found(zero) if is_usual(way.wrapped()) => {
+                *zero = *zero + turns;
+                Some(turns)
             }
-            _ => Some(Angle::ZERO),
+            _ => self.lose_zero(),
         }
+    }
+
+    const fn lose_zero(&mut self) -> Option<Angle> {
+        (self.zero, self.last) = (Zero::Lost, None);
+        None
     }
 
     const fn zero(&self) -> Option<Angle> {

@@ -23,8 +23,8 @@ pub(crate) use registers::{
 pub(crate) use settings::{Inquiry, Preparation, Settings, TimeoutUnits};
 
 use super::{
-    BusLoad, Capability, Claim, Guard, Health, HealthConfig, Ingest, Link, Role, TargetError,
-    Timeouts, Vitals, Watch,
+    BusLoad, Capability, Claim, Guard, Health, HealthConfig, Ingest, Link, Repeat, Role,
+    TargetError, Timeouts, Vitals, Watch,
 };
 use crate::control::PidConfig;
 use crate::error::{ConfigError, finite};
@@ -315,40 +315,36 @@ impl<M: OwnMotor> Own<M> {
         outcome
     }
 
-    /// Takes feedback of a drive that may have started again.
+    /// Takes feedback of a drive that may have started again: in a silence, unless feedback is late only after more, or before an angle that
+    /// jumped. The joint stays where it is, with its target; without its zero, it trips.
     #[cold]
     #[inline(never)]
     fn take_doubtfully(&mut self, frame: &CanFrame, gap_us: Option<u32>, now: Instant) -> Ingest {
-        let before = self.reading();
         let outcome = self.motor.decode(frame);
-        if outcome == Ingest::Taken {
-            self.hear(gap_us, now);
-            self.compare_readings(&before, gap_us.unwrap_or(0), now);
+        if outcome != Ingest::Taken {
+            return outcome;
         }
-        outcome
-    }
-
-    fn reading(&self) -> Reading {
-        Reading(self.motor.angle(), self.motor.velocity())
-    }
-
-    /// The drive started again in a silence, unless feedback is late only after more, or before an angle that jumped. The joint stays where
-    /// it is, with its target; without its zero, it trips.
-    fn compare_readings(&mut self, before: &Reading, gap_us: u32, now: Instant) {
+        self.hear(gap_us, now);
+        let gap_us = gap_us.unwrap_or(0);
         let is_silence = gap_us > SILENCE_US && self.guard.is_late_by(gap_us);
         if is_silence {
             self.motor.forget_settings();
         }
-        let after = self.reading();
-        if !is_silence && !before.jumps_to(&after, gap_us) {
-            return;
+        let (velocity, at) = (self.motor.velocity(), now.stamp());
+        let reading = self.motor.angle().map(|angle| Reading { angle, velocity, at });
+        if !self.joint.depends_on_supply() {
+            return outcome;
         }
-        if let Some(turns) = self.joint.doubt_zero(before.way_to(&after)) {
-            self.target = self.target.moved(turns);
-            self.start = self.start.map(|start| start + turns);
-        } else {
-            self.fail(now);
+        match self.joint.follow(reading, is_silence) {
+            None => self.fail(now),
+            Some(turns) if turns.as_radians() != 0.0 => {
+                self.target = self.target.moved(turns);
+                self.start = self.start.map(|start| start + turns);
+                self.offered.may_repeat = Repeat::NO;
+            }
+            Some(_) => {}
         }
+        outcome
     }
 
     #[inline(always)]

@@ -3,10 +3,9 @@
 
 use super::{BUS_LOST_AFTER, Watch};
 use crate::frame::CanFrame;
-use crate::motor::{Claim, Devices, Role, take_age};
+use crate::motor::{CanDevice, Claim, Devices, Role, Visitor, take_age};
 use crate::time::{Duration, Edge, Instant};
 use core::num::NonZeroU32;
-use embedded_can::Frame;
 
 /// A fault of the bus as a whole, for a moment or for hours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -198,7 +197,10 @@ const FORGOTTEN_AFTER: (Duration, u8) = (Duration::from_secs(1), 32);
 /// How many frames can wait at a time and be watched each: the five of a DJI bus, and own ones.
 pub(super) const WATCHED_FRAMES: usize = 8;
 
-/// The frames of one command: their headers agree in the bits of the mask. A RobStride has a torque in the other bits.
+/// Bits of an id of 29 that may carry a value: in them, a RobStride has its torque.
+const VALUES: u32 = 0x00FF_FF00;
+
+/// The frames of one command: their headers agree in the bits of the mask.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::runner) struct FrameKey {
     header: u32,
@@ -206,19 +208,33 @@ pub(in crate::runner) struct FrameKey {
 }
 
 impl FrameKey {
-    /// Finds the command of a device to which a frame belongs.
+    /// Takes a frame of a device. The bits of values are those that the claim of the command leaves out.
     #[cold]
     #[inline(never)]
     pub(in crate::runner) fn of(device: &mut impl Devices, frame: &CanFrame) -> Self {
-        let covers = |claim: &Claim| claim.role() == Role::Command && claim.covers(frame.id());
-        let mask =
-            device.claims().find(covers).and_then(|claim| NonZeroU32::new(claim.pattern().1));
-        let mask = mask.unwrap_or(NonZeroU32::MAX);
-        Self { header: frame.header() & mask.get(), mask }
+        let mut key = Self { header: frame.header(), mask: NonZeroU32::MAX };
+        if frame.has_extended_id() {
+            device.visit(&mut key);
+        }
+        key
     }
 
     pub(in crate::runner) const fn fits(self, header: u32) -> bool {
         header & self.mask.get() == self.header
+    }
+}
+
+impl Visitor for FrameKey {
+    fn visit(&mut self, device: &mut impl CanDevice) {
+        let fits = |claim: &Claim| {
+            let (header, mask) = claim.pattern();
+            claim.role() == Role::Command && (self.header ^ header) & mask == 0
+        };
+        if let Some(claim) = device.claims().find(fits) {
+            let mask = claim.pattern().1 | !VALUES;
+            self.header &= mask;
+            self.mask = NonZeroU32::new(mask).unwrap_or(NonZeroU32::MAX);
+        }
     }
 }
 

@@ -1,0 +1,183 @@
+//! A joint whose drive may have started again: what shows it, and what does not.
+
+#![cfg(test)]
+#![expect(clippy::cast_precision_loss, reason = "milliseconds of a second")]
+
+use drivetrain::frame::CanFrame;
+use drivetrain::motor::{
+    AngleDrive, Capabilities, Capability, Claim, Devices, Ingest, Malformed, MotorName, Order, Own,
+    OwnMotor, Role, Target,
+};
+use drivetrain::time::{Instant, Tick};
+use drivetrain::units::{Angle, AngularVelocity};
+use embedded_can::{Frame, StandardId};
+use std::f32::consts::{PI, TAU};
+
+/// A drive that reports angle and velocity in rad and rad/s, and takes an angle.
+#[derive(Debug, Clone, Copy)]
+struct Plain {
+    angle: f32,
+    velocity: f32,
+    is_absolute: bool,
+}
+
+fn id(raw: u16) -> StandardId {
+    StandardId::new(raw).unwrap()
+}
+
+impl OwnMotor for Plain {
+    fn name(&self) -> MotorName {
+        MotorName::new("plain", 1)
+    }
+
+    fn claims(&self) -> impl IntoIterator<Item = Claim> {
+        [(0x123, Role::Command), (0x124, Role::Feedback)]
+            .map(|(raw, role)| Claim::new(id(raw), role, MotorName::new("plain", 1)))
+    }
+
+    fn decode(&mut self, frame: &CanFrame) -> Ingest {
+        let [a, b, c, d, e, f, g, h] = *frame.data() else {
+            return Ingest::Malformed(Malformed::Length(frame.length()));
+        };
+        (self.angle, self.velocity) =
+            (f32::from_le_bytes([a, b, c, d]), f32::from_le_bytes([e, f, g, h]));
+        Ingest::Taken
+    }
+
+    fn velocity(&self) -> AngularVelocity {
+        AngularVelocity::from_rad_per_s(self.velocity)
+    }
+
+    fn angle(&self) -> Option<Angle> {
+        Some(Angle::from_radians(self.angle))
+    }
+
+    fn rest(&mut self) -> CanFrame {
+        CanFrame::of(id(0x123), [])
+    }
+
+    fn control(&mut self, Order { target, share: _, step: _ }: Order) -> CanFrame {
+        let Target::Angle(angle) = target else { return self.rest() };
+        CanFrame::of(id(0x123), angle.as_radians().to_le_bytes())
+    }
+
+    fn reset(&mut self) {}
+
+    fn capabilities(&self) -> Capabilities {
+        let offered = Capabilities::of(&[Capability::Angle, Capability::Feedback]);
+        if self.is_absolute { offered.with(Capability::AbsoluteAngle) } else { offered }
+    }
+}
+
+fn at_ms(ms: u64) -> Instant {
+    Instant::from_micros(1_000 * ms)
+}
+
+struct Bench(Own<Plain>);
+
+impl Bench {
+    /// A joint at a zero of its own, armed and led there.
+    fn new(is_absolute: bool, angle: f32) -> Self {
+        let drive = Plain { angle, velocity: 0.0, is_absolute };
+        let mut bench = Self(Own::new(drive).with_opening(drivetrain::time::Duration::ZERO));
+        bench.hear(1, angle, 0.0);
+        bench.0.set_present_angle(Angle::ZERO).unwrap();
+        bench.update(1, 0.001);
+        bench.0.arm(at_ms(1)).unwrap();
+        bench.hear(2, angle, 0.0);
+        bench.0.set_angle((), Angle::ZERO).unwrap();
+        assert_eq!(bench.update(2, 0.001), Some(angle));
+        bench
+    }
+
+    fn hear(&mut self, ms: u64, angle: f32, velocity: f32) {
+        let ([a, b, c, d], [e, f, g, h]) = (angle.to_le_bytes(), velocity.to_le_bytes());
+        let frame = CanFrame::of(id(0x124), [a, b, c, d, e, f, g, h]);
+        assert_eq!(self.0.ingest(&frame, at_ms(ms)), Ingest::Taken);
+    }
+
+    /// Returns the angle that the drive is sent; `None` for rest.
+    fn update(&mut self, ms: u64, dt_s: f32) -> Option<f32> {
+        self.0.update(Tick::new(at_ms(ms), dt_s));
+        let frame = self.0.next_frame(0)?;
+        frame.data().try_into().ok().map(f32::from_le_bytes)
+    }
+
+    fn angle(&self) -> Option<f32> {
+        self.0.angle(()).map(Angle::as_radians)
+    }
+}
+
+fn assert_near(found: Option<f32>, expected: f32) {
+    assert!(found.is_some_and(|found| (found - expected).abs() < 1e-3), "{found:?}, {expected}");
+}
+
+#[test]
+fn a_drive_that_counts_anew_moves_no_joint_and_no_target() {
+    for gap_ms in [1, 5, 20, 99] {
+        // The drive knows its angle within a turn; it lost one turn.
+        let mut bench = Bench::new(true, 4.0);
+        bench.hear(2 + gap_ms, 4.0 - TAU, 0.0);
+        assert_near(bench.angle(), 0.0);
+        if gap_ms < 10 {
+            assert_near(bench.update(2 + gap_ms, 0.001), 4.0 - TAU);
+        }
+        // The drive counts from where it was switched on: nobody knows how far that is.
+        let mut bench = Bench::new(false, 1.5);
+        bench.hear(2 + gap_ms, 0.0, 0.0);
+        assert_eq!((bench.angle(), bench.0.is_armed()), (None, false));
+        assert_eq!(bench.update(2 + gap_ms, 0.001), None);
+    }
+}
+
+/// A held step repeats no command from before: it has the other count.
+#[test]
+fn a_held_step_after_a_restart_sends_no_angle_from_before() {
+    let mut bench = Bench::new(true, 4.0);
+    bench.hear(3, 4.0 - TAU, 0.0);
+    assert_eq!(bench.update(3, 0.0), None);
+    bench.hear(4, 4.0 - TAU, 0.0);
+    assert_near(bench.update(4, 0.001), 4.0 - TAU);
+}
+
+#[test]
+fn an_angle_within_a_turn_is_no_restart_at_its_ends() {
+    for is_absolute in [true, false] {
+        let mut bench = Bench::new(is_absolute, 3.0);
+        for ms in 3..3_000 {
+            let way = 0.006 * (ms - 3) as f32;
+            bench.hear(ms, (3.0 + way + PI).rem_euclid(TAU) - PI, 6.0);
+            bench.update(ms, 0.001);
+            assert_near(bench.angle(), way);
+        }
+        assert!(bench.0.is_armed());
+    }
+}
+
+#[test]
+fn a_healthy_joint_keeps_its_zero() {
+    // From rest to rest within a gap that is almost a loss.
+    let mut bench = Bench::new(false, 0.0);
+    bench.hear(101, 0.6, 0.0);
+    assert_near(bench.angle(), 0.6);
+    // The loop stood still for 31 ms, the controller kept the three oldest frames, and all of them are taken at one time.
+    let mut bench = Bench::new(false, 0.0);
+    let angle = |ms: u64| 0.03 * (ms - 2) as f32;
+    for ms in [3, 4, 5] {
+        bench.hear(36, angle(ms), 30.0);
+    }
+    bench.hear(37, angle(37), 30.0);
+    assert_near(bench.angle(), angle(37));
+    // A wheel at 200 rad/s, heard each 20 ms.
+    let mut bench = Bench::new(false, 0.0);
+    bench.hear(3, 0.0, 200.0);
+    for ms in (23..1_000).step_by(20) {
+        bench.hear(ms, 0.2 * (ms - 3) as f32, 200.0);
+    }
+    assert_near(bench.angle(), 0.2 * 980.0);
+    // A velocity that is no number tells nothing.
+    let mut bench = Bench::new(false, 0.0);
+    bench.hear(3, 0.1, f32::NAN);
+    bench.hear(4, 0.2, f32::NAN);
+    assert_near(bench.angle(), 0.2);
+}
