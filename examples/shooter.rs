@@ -179,11 +179,11 @@ fn shoot() -> Result<(Vec<Sample>, f32), Box<dyn Error>> {
             heat: referee.heat_17mm(now),
             ..feedback(bus, wheels, loader)
         };
-        let (wheel_speed, loader_speed) = shooter.update(order(time_s), &feedback, tick);
+        let targets = shooter.update(order(time_s), &feedback, tick);
         for wheel in wheels {
-            _ = bus.set_velocity(wheel, wheel_speed);
+            _ = bus.set_velocity(wheel, targets.wheels);
         }
-        _ = bus.set_velocity(loader, loader_speed);
+        _ = bus.set_velocity(loader, targets.loader);
         runner.tick(tick);
 
         if shooter.state() != before && shooter.state() == ShooterState::Clearing {

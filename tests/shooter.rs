@@ -5,7 +5,7 @@
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M2006, M3508};
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::shooter::{Shooter, ShooterFeedback, ShooterOrder, ShooterState};
+use drivetrain::shooter::{Shooter, ShooterFeedback, ShooterOrder, ShooterState, ShooterTargets};
 use drivetrain::sim::{Controller, Fault, Line, MotorConfig, MotorKey, Simulation};
 use drivetrain::time::{Duration, Instant};
 use drivetrain::units::AngularVelocity;
@@ -43,11 +43,8 @@ struct Range<'w> {
     ms: u64,
     /// Of the loader's encoder.
     start: i64,
-    targets: (AngularVelocity, AngularVelocity),
+    targets: ShooterTargets,
 }
-
-/// The targets of motors that stand.
-const REST: (AngularVelocity, AngularVelocity) = (AngularVelocity::ZERO, AngularVelocity::ZERO);
 
 fn at_ms(ms: u64) -> Instant {
     Instant::from_micros(1_000 * ms)
@@ -86,7 +83,7 @@ impl<'w> Range<'w> {
             brake_until_ms: 0,
             ms: 0,
             start: world.motor(keys[2]).unwrap().encoder_counts,
-            targets: REST,
+            targets: ShooterTargets::REST,
         }
     }
 
@@ -167,9 +164,9 @@ impl<'w> Range<'w> {
             };
             self.targets = self.shooter.update(order, &feedback, tick);
             for wheel in self.wheels {
-                _ = bus.set_velocity(wheel, self.targets.0);
+                _ = bus.set_velocity(wheel, self.targets.wheels);
             }
-            _ = bus.set_velocity(self.loader, self.targets.1);
+            _ = bus.set_velocity(self.loader, self.targets.loader);
             self.runner.tick(tick);
             if self.shooter.state() == ShooterState::Ready {
                 self.off_when_ready = self.off_when_ready.max(self.deviation());
@@ -229,7 +226,7 @@ fn a_jam_that_gives_way_is_cleared_and_one_that_does_not_stops_the_shooter() {
     range.run(ShooterOrder::Spin, 20, true);
     range.run(ShooterOrder::Fire(3), 2_000, true);
     assert_eq!(range.shooter.state(), ShooterState::Jammed);
-    assert_eq!((range.targets, range.balls), (REST, 3));
+    assert_eq!((range.targets, range.balls), (ShooterTargets::REST, 3));
     // Neither a new trigger nor a spin clears it: rest does.
     range.run(ShooterOrder::Spin, 50, true);
     range.run(ShooterOrder::Fire(1), 50, true);
@@ -271,14 +268,14 @@ fn a_wheel_that_is_lost_stops_wheels_and_loader_and_comes_back_only_after_rest()
         range.run(ShooterOrder::Fire(50), 300, true);
         let fault = if fault_of_wheel { ShooterState::WheelLost } else { ShooterState::LoaderLost };
         assert_eq!(range.shooter.state(), fault);
-        assert_eq!(range.targets, REST);
+        assert_eq!(range.targets, ShooterTargets::REST);
         // A loader that is silent is not braked: it coasts, and a ball may drop.
         let balls = range.balls;
         range.run(ShooterOrder::Fire(50), 100, true);
         assert!(range.balls <= balls + 1);
         let balls = range.balls;
         range.run(ShooterOrder::Fire(50), 1_000, true); // it is heard again since long
-        assert_eq!((range.balls, range.targets), (balls, REST));
+        assert_eq!((range.balls, range.targets), (balls, ShooterTargets::REST));
         assert!(range.wheels_rpm().iter().all(|rpm| *rpm < 40.0) && range.loader_rpm() == 0.0);
         range.run(ShooterOrder::Rest, 100, true);
         range.run(ShooterOrder::Spin, 2_000, true);
@@ -306,7 +303,7 @@ fn disarmed_everything_is_at_rest_and_a_held_trigger_shoots_nothing_when_armed_a
     let balls = range.balls;
     assert!(balls > 0);
     range.run(ShooterOrder::Fire(50), 200, false);
-    assert_eq!((range.shooter.state(), range.targets), (ShooterState::Rest, REST));
+    assert_eq!((range.shooter.state(), range.targets), (ShooterState::Rest, ShooterTargets::REST));
     assert!(range.balls <= balls + 1, "the loader stops by its friction");
     let balls = range.balls;
     let commands = world.traffic(Line::Can1);

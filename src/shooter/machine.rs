@@ -1,5 +1,5 @@
 use super::loader::{Feed, Loader};
-use super::{REST, ShooterConfig, ShooterFeedback, ShooterOrder, ShooterState};
+use super::{ShooterConfig, ShooterFeedback, ShooterOrder, ShooterState, ShooterTargets};
 use crate::encoder::Position;
 use crate::error::ConfigError;
 use crate::time::{Duration, Tick};
@@ -35,8 +35,8 @@ const LONGEST_STEP_S: f32 = 0.1;
 ///         heat: Some(BarrelHeat { heat: 0, limit: 200, cooling_per_s: 10 }), // `Referee::heat_17mm`
 ///     };
 ///     let order = if ms < 100 { ShooterOrder::Spin } else { ShooterOrder::Fire(1) };
-///     let tick = Tick::new(Instant::from_micros(1_000 * ms), 0.001);
-///     (wheels, velocity) = shooter.update(order, &feedback, tick);
+///     let targets = shooter.update(order, &feedback, Tick::new(Instant::from_micros(1_000 * ms), 0.001));
+///     (wheels, velocity) = (targets.wheels, targets.loader);
 ///     angle_rad += 0.001 * velocity.as_rad_per_s();
 /// }
 /// assert_eq!(shooter.shots(), 1); // however long the trigger is held
@@ -168,8 +168,7 @@ impl Shooter {
         self.config.feed_velocity()
     }
 
-    /// Takes order and feedback of a tick, and returns the target speeds: of both friction wheels, positive in the shooting direction, and
-    /// of the loader, positive in the feeding direction.
+    /// Takes order and feedback of a tick, and returns the target speeds of the motors.
     ///
     /// While the robot is disarmed, all motors stand and no shot waits. If the time step is not a positive number up to 0.1 s, all motors
     /// stand for that tick, and nothing else changes.
@@ -180,10 +179,10 @@ impl Shooter {
         order: ShooterOrder,
         feedback: &ShooterFeedback,
         tick: Tick,
-    ) -> (AngularVelocity, AngularVelocity) {
+    ) -> ShooterTargets {
         let dt_s = tick.dt_s();
         if !(dt_s > 0.0 && dt_s <= LONGEST_STEP_S) {
-            return REST;
+            return ShooterTargets::REST;
         }
         self.heat.update(feedback.heat, self.config.without_referee, dt_s);
         if !feedback.is_armed {
@@ -196,7 +195,7 @@ impl Shooter {
             return self.rest();
         }
         if self.state.is_fault() {
-            return REST;
+            return ShooterTargets::REST;
         }
         let (wheels, loader) = match (feedback.wheels, feedback.loader) {
             ([Some(left), Some(right)], Some(loader)) => ([left, right], loader),
@@ -261,7 +260,7 @@ impl Shooter {
         is_settled: bool,
         is_kept_waiting: bool,
         dt_s: f32,
-    ) -> (AngularVelocity, AngularVelocity) {
+    ) -> ShooterTargets {
         let feed = self.config.feed_velocity().as_rad_per_s();
         let rates = (feed, self.config.gain_per_s, self.config.jam_s);
         let (step, counted) = self.loader.step(loader, rates, dt_s);
@@ -275,20 +274,23 @@ impl Shooter {
             Feed::Idle => (ShooterState::Ready, 0.0),
         };
         self.state = state;
-        (self.config.wheels, AngularVelocity::from_rad_per_s(loader))
+        ShooterTargets {
+            wheels: self.config.wheels,
+            loader: AngularVelocity::from_rad_per_s(loader),
+        }
     }
 
-    fn rest(&mut self) -> (AngularVelocity, AngularVelocity) {
+    fn rest(&mut self) -> ShooterTargets {
         self.state = ShooterState::Rest;
         self.ordered = 0;
         self.loader.stop();
-        REST
+        ShooterTargets::REST
     }
 
-    fn fail(&mut self, fault: ShooterState) -> (AngularVelocity, AngularVelocity) {
+    fn fail(&mut self, fault: ShooterState) -> ShooterTargets {
         self.rest();
         self.state = fault;
-        REST
+        ShooterTargets::REST
     }
 
     /// Returns the state of the shooter.

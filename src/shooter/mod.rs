@@ -6,7 +6,7 @@
 //!  referee ── heat ─┘                                     └── speed of the loader
 //! ```
 //!
-//! The module is independent of bus and motor: from feedback to target speeds. A motor of any family fits, if its
+//! The module is independent of bus and motor: from feedback to target speeds ([`ShooterTargets`]). A motor of any family fits, if its
 //! drive has a velocity loop and a position of the shaft over many turns. The speed is that of the shaft: friction wheels on M3508 without
 //! their gearbox are attached with [`with_gear(GearRatio::DIRECT)`](crate::dji::Config::with_gear), some 6000 rpm; the example `shooter`
 //! turns geared wheels at 400 rpm.
@@ -34,8 +34,8 @@
 //! let tick = Tick::new(Instant::from_micros(1_000), 0.001);
 //!
 //! let disarmed = ShooterFeedback::default();
-//! let (wheels, loader) = shooter.update(ShooterOrder::Fire(1), &disarmed, tick);
-//! assert_eq!((wheels.as_rpm(), loader.as_rpm()), (0.0, 0.0));
+//! let targets = shooter.update(ShooterOrder::Fire(1), &disarmed, tick);
+//! assert_eq!((targets.wheels.as_rpm(), targets.loader.as_rpm()), (0.0, 0.0));
 //! assert_eq!(shooter.state(), ShooterState::Rest);
 //! # Ok::<(), drivetrain::error::ConfigError>(())
 //! ```
@@ -146,8 +146,20 @@ pub struct ShooterFeedback {
     pub heat: Option<BarrelHeat>,
 }
 
-/// Targets with which all motors stand.
-const REST: (AngularVelocity, AngularVelocity) = (AngularVelocity::ZERO, AngularVelocity::ZERO);
+/// Target speeds of a shooter's motors.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ShooterTargets {
+    /// Both friction wheels, positive in the shooting direction.
+    pub wheels: AngularVelocity,
+    /// The loader, positive in the feeding direction.
+    pub loader: AngularVelocity,
+}
+
+impl ShooterTargets {
+    /// All motors stand.
+    pub const REST: Self = Self { wheels: AngularVelocity::ZERO, loader: AngularVelocity::ZERO };
+}
 
 /// Largest number of chambers of a loader, and of shots in 1 s.
 const MOST: f32 = 64.0;

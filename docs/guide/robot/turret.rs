@@ -56,11 +56,11 @@ impl Turret {
                 .map(|state| (state.position, state.velocity)),
             heat,
         };
-        let (wheel_speed, loader_speed) = self.shooter.update(order, &feedback, tick);
+        let targets = self.shooter.update(order, &feedback, tick);
         for wheel in self.friction {
-            _ = bus.set_velocity(wheel, wheel_speed);
+            _ = bus.set_velocity(wheel, targets.wheels);
         }
-        _ = bus.set_velocity(self.loader, loader_speed);
+        _ = bus.set_velocity(self.loader, targets.loader);
         _ = bus.set_position(self.yaw, Position::from_angle(angle));
     }
 }

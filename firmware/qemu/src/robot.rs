@@ -12,7 +12,7 @@ use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Handle, M3508};
 use drivetrain::encoder::Position;
 use drivetrain::geometry::{Body, Gimbal, Twist, Vec2};
-use drivetrain::shooter::{Shooter, ShooterFeedback, ShooterOrder};
+use drivetrain::shooter::{Shooter, ShooterFeedback, ShooterOrder, ShooterTargets};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use drivetrain::wire::referee::BarrelHeat;
@@ -90,11 +90,7 @@ fn robot_cut(model: &PowerModel, loads: &[WheelLoad; 4]) -> (f32, f32) {
 
 #[unsafe(no_mangle)]
 #[inline(never)]
-fn robot_shooter(
-    shooter: &mut Shooter,
-    feedback: &ShooterFeedback,
-    tick: Tick,
-) -> (AngularVelocity, AngularVelocity) {
+fn robot_shooter(shooter: &mut Shooter, feedback: &ShooterFeedback, tick: Tick) -> ShooterTargets {
     shooter.update(ShooterOrder::Spin, feedback, tick)
 }
 
@@ -188,8 +184,7 @@ fn shooter() {
         heat: Some(BarrelHeat { heat: 0, limit: 200, cooling_per_s: 10 }),
     };
     let mut now: Instant = START;
-    let function = robot_shooter
-        as fn(&mut Shooter, &ShooterFeedback, Tick) -> (AngularVelocity, AngularVelocity);
+    let function = robot_shooter as fn(&mut Shooter, &ShooterFeedback, Tick) -> ShooterTargets;
     let update = instructions(function, |f, _| {
         now = now + PERIOD;
         _ = black_box(f(&mut shooter, &feedback, Tick::new(now, 0.001)));
