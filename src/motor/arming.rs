@@ -290,11 +290,11 @@ impl core::fmt::Display for WrongSetting {
 /// use drivetrain::motor::{ArmingSwitch, SwitchOrder};
 ///
 /// let mut switch = ArmingSwitch::new();
-/// assert_eq!(switch.read(true), SwitchOrder::Keep); // on at power-on: disarmed, as it was
-/// assert_eq!(switch.read(false), SwitchOrder::Disarm);
-/// assert_eq!(switch.read(true), SwitchOrder::Arm);
+/// assert_eq!(switch.read(Some(true)), SwitchOrder::Keep); // on at power-on: disarmed, as it was
+/// assert_eq!(switch.read(Some(false)), SwitchOrder::Disarm);
+/// assert_eq!(switch.read(Some(true)), SwitchOrder::Arm);
 /// assert_eq!(switch.read(None), SwitchOrder::Disarm); // not heard
-/// assert_eq!(switch.read(true), SwitchOrder::Keep); // heard again, and nobody has turned the switch
+/// assert_eq!(switch.read(Some(true)), SwitchOrder::Keep); // heard again, and nobody has turned the switch
 /// ```
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -311,9 +311,8 @@ impl ArmingSwitch {
 
     /// Takes the position, on or off, and `None` while it is not known: once a tick.
     #[must_use]
-    pub fn read(&mut self, is_on: impl Into<Option<bool>>) -> SwitchOrder {
-        let is_on = is_on.into();
-        let was_off = core::mem::replace(&mut self.was_off, is_on == Some(false));
+    pub const fn read(&mut self, is_on: Option<bool>) -> SwitchOrder {
+        let was_off = core::mem::replace(&mut self.was_off, matches!(is_on, Some(false)));
         match is_on {
             Some(true) if was_off => SwitchOrder::Arm,
             Some(true) => SwitchOrder::Keep,

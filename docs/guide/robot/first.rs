@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         runner.poll(16); // takes received frames
         let Some(tick) = runner.due() else { continue }; // once a millisecond
 
-        match switch.read((100..1_500).contains(&ms)) {
+        match switch.read(Some((100..1_500).contains(&ms))) {
             SwitchOrder::Arm => runner.arm(tick)?, // turned on just now
             SwitchOrder::Keep => {}
             SwitchOrder::Disarm => runner.device_mut().disarm(),

@@ -236,7 +236,7 @@ fn motor() {
     (|missing: &Missing| Missing::names(missing).count()).call();
     Missing::total.call();
     ArmingSwitch::new.call();
-    (|switch: &mut ArmingSwitch, is_on: Option<bool>| ArmingSwitch::read(switch, is_on)).call();
+    ArmingSwitch::read.call();
     Missing::full_bus.call();
     (|id: Id, role: Role, motor: MotorName| Claim::new(id, role, motor)).call();
     Claim::with_mask.call();
