@@ -28,6 +28,30 @@
 //! A motor of the application joins by implementing [`OwnMotor`]: its ids, frames and loop, and of safety only the frame of
 //! rest. A motor outside of this scheme implements [`CanDevice`] itself, with a [`Guard`] for each motor. Tuples and arrays
 //! of devices are [`Devices`]; a struct of devices names its parts in one method.
+//!
+//! # States
+//! The rules of all families have two states for each motor. The [`Link`] follows the age of the feedback, by the limits of [`Timeouts`]:
+//!
+//! | link | feedback is received | feedback is older than *late* | feedback is older than *offline* |
+//! |---|---|---|---|
+//! | unheard | online | | |
+//! | online | online | late | offline |
+//! | late | online | | offline |
+//! | offline | recovering, or online when one frame is enough | | |
+//! | recovering | online with the last of the good frames in a row | | offline |
+//!
+//! The arming decides whether the motor takes targets: only an armed motor does.
+//!
+//! | arming | a granted request to arm | offline | a fault, lost time | disarm, emergency stop |
+//! |---|---|---|---|---|
+//! | disarmed | armed | | | |
+//! | armed | | latched | tripped | disarmed |
+//! | latched | armed | | tripped | disarmed |
+//! | tripped | armed | | | disarmed |
+//!
+//! A latched and a tripped motor differ in one thing: if [`with_resume`](crate::dji::Config::with_resume) is configured, a latched motor
+//! takes targets again by itself when online. Each latch, each trip and the emergency stop begin the pause of the gesture: a request to arm
+//! is granted after 100 ms without a request. Disarming begins no pause.
 
 mod arming;
 mod capability;

@@ -12,27 +12,8 @@
 //! | is there a target that is not expired? | `MotorGuard::age` | relaxed |
 //! | how far is the output range open? | `MotorGuard::share` | that share of the full command |
 //!
-//! The [health](super::HealthConfig) of a family finds faults, a second master, heat and a stall. Each acts by [`MotorGuard::trip`], as one
-//! of the transitions below.
-//!
-//! | link | feedback is received | feedback is older than *late* | feedback is older than *offline* |
-//! |---|---|---|---|
-//! | unheard | online | | |
-//! | online | online | late | offline |
-//! | late | online | | offline |
-//! | offline | recovering, or online when one frame is enough | | |
-//! | recovering | online with the last of the good frames in a row | | offline |
-//!
-//! | arming | engage | offline | a fault, lost time | disarm, emergency stop |
-//! |---|---|---|---|---|
-//! | disarmed | armed | | | |
-//! | armed | | latched | tripped | disarmed |
-//! | latched | armed | | tripped | disarmed |
-//! | tripped | armed | | | disarmed |
-//!
-//! A latched and a tripped motor differ in one thing: if [`with_resume`](crate::dji::Config::with_resume) is configured, a latched motor
-//! takes targets again by itself when online. Each latch, each trip and the emergency stop begin the pause of the gesture; disarming does
-//! not.
+//! The [health](super::HealthConfig) of a family finds faults, a second master, heat and a stall. Each acts by [`MotorGuard::trip`]. The tables
+//! of links and of arming, with all transitions, stand in the documentation of [`motor`](super#states).
 //!
 //! Times of a motor are stamps of 32 bits. Ages of several motors are compared together ([`Ages`]): no motor is checked again before the
 //! greatest age can have exceeded its limit.
