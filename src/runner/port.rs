@@ -314,7 +314,6 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
                 Sent::Evicted => {
                     self.count_sent(&frame);
                     let key = FrameKey::of(self.device, &other);
-                    let is_older = key.fits(frame.header());
                     let place = ids.get_mut(evictions);
                     let place = place.filter(|_| other.header() != frame.header());
                     let waits = place.is_some() && self.device.put_back(&other);
@@ -327,7 +326,7 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
                         increment(&mut self.statistics.evicted_unrelated);
                         evicted(&other);
                     }
-                    if !is_older {
+                    if !key.fits(frame.header()) {
                         self.watch.accepted(frame.header(), self.now);
                     }
                     if let Some(place) = place.filter(|_| waits) {

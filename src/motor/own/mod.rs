@@ -304,28 +304,22 @@ impl<M: OwnMotor> Own<M> {
             return Ingest::Taken;
         }
         let gap_us = self.guard.gap_us(now);
-        let is_silence = gap_us.is_some_and(|gap_us| gap_us > SILENCE_US);
-        if is_silence || self.joint.depends_on_supply() {
-            return self.take_doubtfully(frame, gap_us, now);
-        }
         let outcome = self.motor.decode(frame);
         if outcome == Ingest::Taken {
             self.hear(gap_us, now);
+            let gap_us = gap_us.unwrap_or(0);
+            if gap_us > SILENCE_US || self.joint.depends_on_supply() {
+                self.doubt(gap_us, now);
+            }
         }
         outcome
     }
 
-    /// Takes feedback of a drive that may have started again: in a silence, unless feedback is late only after more, or before an angle that
-    /// jumped. The joint stays where it is, with its target; without its zero, it trips.
+    /// Asks whether the drive started again: in a silence, unless feedback is late only after more, or before an angle that jumped. The
+    /// joint stays where it is, with its target; without its zero, it trips.
     #[cold]
     #[inline(never)]
-    fn take_doubtfully(&mut self, frame: &CanFrame, gap_us: Option<u32>, now: Instant) -> Ingest {
-        let outcome = self.motor.decode(frame);
-        if outcome != Ingest::Taken {
-            return outcome;
-        }
-        self.hear(gap_us, now);
-        let gap_us = gap_us.unwrap_or(0);
+    fn doubt(&mut self, gap_us: u32, now: Instant) {
         let is_silence = gap_us > SILENCE_US && self.guard.is_late_by(gap_us);
         if is_silence {
             self.motor.forget_settings();
@@ -333,7 +327,7 @@ impl<M: OwnMotor> Own<M> {
         let (velocity, at) = (self.motor.velocity(), now.stamp());
         let reading = self.motor.angle().map(|angle| Reading { angle, velocity, at });
         if !self.joint.depends_on_supply() {
-            return outcome;
+            return;
         }
         match self.joint.follow(reading, is_silence) {
             None => self.fail(now),
@@ -344,7 +338,6 @@ impl<M: OwnMotor> Own<M> {
             }
             Some(_) => {}
         }
-        outcome
     }
 
     #[inline(always)]
