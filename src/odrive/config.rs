@@ -9,9 +9,9 @@ use crate::units::AngularVelocity;
 
 /// A motor of this family in a control mode: see the [module](super).
 ///
-/// Costs 6257 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
+/// Costs 6334 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
 ///
-/// Costs 152 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
+/// Costs 159 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
 ///
 /// # Examples
 /// ```

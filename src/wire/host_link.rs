@@ -170,7 +170,7 @@ impl Reset {
 impl HostCommand {
     /// Writes the frame, and returns the filled part of `out`.
     ///
-    /// Costs 545 instructions on a Cortex-M4F (`docs/figures.md`).
+    /// Costs 540 instructions on a Cortex-M4F (`docs/figures.md`).
     ///
     /// # Errors
     /// [`EncodeError::BufferTooSmall`] when `out` has less than [`COMMAND_LENGTH`] bytes.
