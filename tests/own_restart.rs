@@ -6,9 +6,9 @@
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
     AngleDrive, Capabilities, Capability, Claim, Devices, Ingest, Malformed, MotorName, Order, Own,
-    OwnMotor, Role, Target,
+    OwnMotor, Role, Target, Timeouts,
 };
-use drivetrain::time::{Instant, Tick};
+use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use embedded_can::{Frame, StandardId};
 use std::f32::consts::{PI, TAU};
@@ -79,7 +79,7 @@ impl Bench {
     /// A joint at a zero of its own, armed and led there.
     fn new(is_absolute: bool, angle: f32) -> Self {
         let drive = Plain { angle, velocity: 0.0, is_absolute };
-        let mut bench = Self(Own::new(drive).with_opening(drivetrain::time::Duration::ZERO));
+        let mut bench = Self(Own::new(drive).with_opening(Duration::ZERO));
         bench.hear(1, angle, 0.0);
         bench.0.set_present_angle(Angle::ZERO).unwrap();
         bench.update(1, 0.001);
@@ -175,6 +175,17 @@ fn a_healthy_joint_keeps_its_zero() {
         bench.hear(ms, 0.2 * (ms - 3) as f32, 200.0);
     }
     assert_near(bench.angle(), 0.2 * 980.0);
+    // The same heard each 200 ms, with limits made for that.
+    let timeouts = Timeouts::new()
+        .with_feedback(Duration::from_millis(300), Duration::from_millis(500))
+        .unwrap();
+    let mut bench = Bench::new(false, 0.0);
+    bench.0 = bench.0.with_timeouts(timeouts);
+    bench.hear(3, 0.0, 200.0);
+    for ms in (203..3_000).step_by(200) {
+        bench.hear(ms, 0.2 * (ms - 3) as f32, 200.0);
+        assert_near(bench.angle(), 0.2 * (ms - 3) as f32);
+    }
     // A velocity that is no number tells nothing.
     let mut bench = Bench::new(false, 0.0);
     bench.hear(3, 0.1, f32::NAN);

@@ -14,15 +14,14 @@ pub(super) struct Reading {
 
 /// Feedback may have waited in a buffer for so long, in s.
 const WAITED_S: f32 = 0.04;
-/// After a longer time without an angle, in s, whole turns are not known.
+/// After a longer time of feedback without an angle, in s, whole turns are not known.
 const UNKNOWN_S: f32 = 0.1;
 
 impl Reading {
     /// Returns the largest way in rad of the shaft to a later reading: at the larger of both velocities, for a little longer than the time
     /// between them, and beside that 0.25 rad, and 8 rad/s for a shaft that sped up and stopped meanwhile.
-    fn furthest(&self, later: &Self) -> f32 {
+    fn furthest(&self, later: &Self, gap_s: f32) -> f32 {
         let (one, other) = (self.velocity.as_rad_per_s(), later.velocity.as_rad_per_s());
-        let gap_s = self.gap_s(later).min(UNKNOWN_S);
         // A velocity that is no number counts as none.
         let fastest = one.abs().max(other.abs()).max(0.0);
         0.25 + 8.0 * gap_s + 1.5 * fastest * gap_s.max(WAITED_S)
@@ -73,11 +72,16 @@ impl Joint {
         matches!(self.zero, Zero::Placed(_) | Zero::Found(_))
     }
 
-    /// Takes the angle of a frame of feedback, after a silence or not. A drive counts anew if the angle is further away than the shaft can
+    /// Takes the angle of a frame of feedback, so long after the frame before, after a silence or not. A drive counts anew if the angle is further away than the shaft can
     /// have turned. Returns by how much the drive counts further than before; `None` if the zero is lost.
     ///
     /// A jump by whole turns is no loss: some drives count within a turn.
-    pub(super) fn follow(&mut self, reading: Option<Reading>, is_silence: bool) -> Option<Angle> {
+    pub(super) fn follow(
+        &mut self,
+        reading: Option<Reading>,
+        gap_us: u32,
+        is_silence: bool,
+    ) -> Option<Angle> {
         let last = self.last;
         self.last = reading.or(last);
         let (reading, last) = match (reading, last) {
@@ -85,12 +89,14 @@ impl Joint {
             _ if is_silence => return self.lose_zero(),
             _ => return Some(Angle::ZERO),
         };
-        let (way, furthest) = (reading.angle - last.angle, last.furthest(&reading));
+        let (gap_s, known_s) = (last.gap_s(&reading), UNKNOWN_S.max(gap_us as f32 * 1e-6));
+        let furthest = last.furthest(&reading, gap_s.min(known_s));
+        let way = reading.angle - last.angle;
         let turns = way - way.wrapped();
         let is_usual = |way: Angle| !is_silence && way.as_radians().abs() <= furthest;
         match &mut self.zero {
             _ if is_usual(way) => Some(Angle::ZERO),
-            _ if !is_silence && last.gap_s(&reading) > UNKNOWN_S => self.lose_zero(),
+            _ if !is_silence && gap_s > known_s => self.lose_zero(),
             Zero::Placed(zero) => {
                 *zero = *zero + turns;
                 Some(turns)

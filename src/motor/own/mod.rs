@@ -329,7 +329,7 @@ impl<M: OwnMotor> Own<M> {
         if !self.joint.depends_on_supply() {
             return;
         }
-        match self.joint.follow(reading, is_silence) {
+        match self.joint.follow(reading, gap_us, is_silence) {
             None => self.fail(now),
             Some(turns) if turns.as_radians() != 0.0 => {
                 self.target = self.target.moved(turns);
