@@ -70,8 +70,8 @@ pub(crate) struct Robot<'w> {
     /// When the last command came, and how fast its targets moved, in pulses a second.
     heard: Instant,
     rates: [f32; JOINTS],
-    /// As in the last command: only a change of it does something.
-    reset: Reset,
+    /// As in the last command, of which only a change does something; `None` before the first, and after a silence.
+    reset: Option<Reset>,
     drives: bool,
     ticks: u32,
     pub(crate) accepted: Vec<HostCommand>,
@@ -102,7 +102,7 @@ impl<'w> Robot<'w> {
             servo_position: None,
             heard: Instant::START,
             rates: [0.0; JOINTS],
-            reset: Reset::None,
+            reset: None,
             drives: false,
             ticks: 0,
             accepted: Vec::new(),
@@ -164,14 +164,18 @@ impl<'w> Robot<'w> {
         }
         match self.host.latest(now) {
             Some(command) => {
-                let reset = std::mem::replace(&mut self.reset, command.reset);
-                if reset != command.reset {
+                // The first order after power-on and after a silence is that of nobody: a change is an order.
+                let before = self.reset.replace(command.reset);
+                if before.is_some_and(|before| before != command.reset) {
                     self.obey(command.reset, tick);
                 }
                 let age_us = now.since(self.heard + COMMAND_LATE).as_micros();
                 self.follow(&command, age_us / COMMAND_PERIOD.as_micros());
             }
-            None => self.relax(now, "the host is silent"),
+            None => {
+                self.reset = None;
+                self.relax(now, "the host is silent");
+            }
         }
         // One motor less, and the others stop as well.
         if !self.runner.is_armed() {
