@@ -172,7 +172,7 @@ fn state_space() {
     LuenbergerObserver::<6, 2, 2>::rejected.call();
     LinearSystem::<6, 2>::input_inverse.call();
     (|plant: &LinearSystem<6, 2>, inverse: &_, reference: &_, next: &_| {
-        plant.effort(inverse, reference, next)
+        LinearSystem::effort(plant, inverse, reference, next)
     })
     .call();
     (|table: &[(f32, [[f32; 6]; 2]); 4], parameter| scheduled_gain(table, parameter)).call();

@@ -14,6 +14,7 @@ pub fn call_all() {
     Shooter::new.call();
     Shooter::update.call();
     Shooter::state.call();
+    ShooterState::is_fault.call();
     Shooter::shots.call();
     Shooter::tries.call();
     Shooter::heat.call();

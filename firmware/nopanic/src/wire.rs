@@ -123,7 +123,7 @@ fn referee_system() {
     (|referee: &mut Referee, input: &mut &'static [u8], now| Referee::read(referee, input, now))
         .call();
     Deframer::<RefereeMessage, { referee::MAX_FRAME }>::read.call();
-    (|message: &RefereeMessage| message.as_raw().map(|(_, data)| data.len())).call();
+    (|message: &RefereeMessage| RefereeMessage::as_raw(message).map(|(_, data)| data.len())).call();
     referee::encode.call();
     Deframer::<VideoRemote, 21>::with_options.call();
     Deframer::<VideoRemote, 21>::read.call();
