@@ -9,9 +9,7 @@ use drivetrain::motor::{
     AngleDrive, CanDevice, Devices, Impedance, ImpedanceControl, Ingest, Own, OwnMotor, Role,
     VelocityDrive,
 };
-use drivetrain::sim::{
-    DamiaoDrive, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive,
-};
+use drivetrain::sim::{DamiaoDrive, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use drivetrain::{damiao, lk, odrive, rmd, robstride, vesc};

@@ -110,12 +110,7 @@ impl Pilot {
     /// Takes bytes of a PC that arrived at `now`, and gives the wheels the gains that they set, without a jump of the output.
     ///
     /// To be called between two ticks.
-    pub fn hear_debug_port(
-        &mut self,
-        bus: &mut Bus,
-        mut bytes: &[u8],
-        now: Instant,
-    ) -> Counts {
+    pub fn hear_debug_port(&mut self, bus: &mut Bus, mut bytes: &[u8], now: Instant) -> Counts {
         while self.parameters.read(&mut bytes, now).is_some() {
             let (kp, ki, kd) = self.gains(now);
             for wheel in self.wheels.into_array() {
