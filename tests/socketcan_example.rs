@@ -5,6 +5,8 @@
 #[path = "../examples/motors/mod.rs"]
 #[expect(dead_code, reason = "the help of the program names the models")]
 mod motors;
+#[path = "../examples/motors/own.rs"]
+mod own;
 #[path = "../examples/socketcan/robot.rs"]
 mod robot;
 

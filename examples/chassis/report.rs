@@ -79,7 +79,7 @@ pub(crate) fn table(run: &Run) -> String {
     text
 }
 
-/// What the ESCs did while no command reached them.
+/// Describes the ESCs while no command reached them.
 fn escs(run: &Run) -> String {
     let Some(silence) = &run.silence else {
         return "ESCs         commands reached them all the while\n".into();

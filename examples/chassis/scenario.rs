@@ -35,7 +35,7 @@ const SETTLING_S: f32 = 0.3;
 pub(crate) type Robot<'w> = Runner<Nb<Controller<'w>>, &'w Simulation, Bus>;
 pub(crate) type Wheels = MecanumWheels<Handle<M3508>>;
 
-/// What can be made to go wrong.
+/// Faults that a scenario can plant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Trouble {
     SilentMotor,
@@ -77,7 +77,7 @@ pub(crate) struct Scenario {
     pub(crate) seconds: f32,
     pub(crate) seed: u64,
     pub(crate) fault: Option<Trouble>,
-    /// What a PC sends over the serial port.
+    /// Lines of a PC for the serial port.
     pub(crate) serial: Option<Script>,
 }
 
@@ -107,7 +107,7 @@ pub(crate) struct Run {
     pub(crate) trouble: Option<(Trouble, f32, f32)>,
     /// The longest time in which the trouble kept all commands from the ESCs.
     pub(crate) silence: Option<Silence>,
-    /// What the robot answered over the serial port, and how many lines it took.
+    /// The answers of the robot over the serial port, and the number of lines taken.
     pub(crate) serial: Option<(String, Counts)>,
 }
 

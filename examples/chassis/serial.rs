@@ -101,7 +101,7 @@ impl SerialPort {
         Ok(())
     }
 
-    /// What the robot answered, and how many lines it took.
+    /// Returns the answers of the robot, and the number of lines taken.
     pub(crate) fn finish(self) -> (String, Counts) {
         (self.answers, self.parameters.counts())
     }

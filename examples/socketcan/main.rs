@@ -15,6 +15,8 @@
 mod arguments;
 #[path = "../motors/mod.rs"]
 mod motors;
+#[path = "../motors/own.rs"]
+mod own;
 mod robot;
 
 use lexopt::prelude::*;

@@ -1,6 +1,7 @@
 //! Motors of any family as one device, and the run: armed, turned, left at rest.
 
 use crate::motors::{Model, Spec};
+use crate::own::{Kind, each};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{self, AnyHandle, Bus};
 use drivetrain::encoder::GearRatio;
@@ -26,30 +27,6 @@ const FASTEST: AngularVelocity = AngularVelocity::from_rpm(2_000.0);
 const PATIENCE: Duration = Duration::from_millis(2_000);
 const TIME: Duration = Duration::from_millis(5_000);
 const ZEROS: u32 = 300;
-
-/// A motor of each family whose drives have frames of their own.
-enum Kind {
-    Damiao(Own<damiao::Motor>),
-    Lk(Own<lk::Motor>),
-    Rmd(Own<rmd::Motor>),
-    RobStride(Own<robstride::Motor>),
-    Odrive(Own<odrive::Motor>),
-    Vesc(Own<vesc::Motor>),
-}
-
-/// Does the same with a motor of whatever family.
-macro_rules! each {
-    ($kind:expr, $own:ident => $work:expr) => {
-        match $kind {
-            Kind::Damiao($own) => $work,
-            Kind::Lk($own) => $work,
-            Kind::Rmd($own) => $work,
-            Kind::RobStride($own) => $work,
-            Kind::Odrive($own) => $work,
-            Kind::Vesc($own) => $work,
-        }
-    };
-}
 
 /// The motors of a command line: those of DJI on their bus, all others beside it with their speeds.
 pub(crate) struct Robot {

@@ -14,7 +14,7 @@ const PERIOD: Duration = Duration::from_millis(50);
 const LATENCY_S: f32 = 0.025;
 /// A position is so old when its telemetry has arrived: 11 ms on the line, and polled each 12 or 24 ms.
 const AGE_S: f32 = 0.02;
-/// What a joint is further behind than this, it makes up for: a damaged command is 50 ms without a new target.
+/// The lag that a joint may keep; a joint makes up for more. After a damaged command, 50 ms pass without a new target.
 const LAG_DEG: f32 = 1.0;
 /// Speed with which the joints go to the straight body.
 const HOMING_RPM: u8 = 15;

@@ -155,8 +155,8 @@ impl Mean {
 
 /// Follows targets that move, within limits that change, with `N` axes in step.
 ///
-/// Each update with another target or other limits plans anew from the state that the last one returned, so position, velocity and
-/// acceleration never jump, whatever the targets do.
+/// An update with another target or other limits plans anew, from the state that the update before returned: position, velocity and
+/// acceleration never jump, for any sequence of targets.
 ///
 /// A target with a velocity is met where it was told to be, so a target that moves on is pursued: tell the follower where it will be
 /// after [`left_s`](Self::left_s) to meet it.

@@ -324,11 +324,11 @@ impl<M: OwnMotor> Own<M> {
         if is_silence {
             self.motor.forget_settings();
         }
-        let (velocity, at) = (self.motor.velocity(), now.stamp());
-        let reading = self.motor.angle().map(|angle| Reading { angle, velocity, at });
         if !self.joint.depends_on_supply() {
             return;
         }
+        let (velocity, at) = (self.motor.velocity(), now.stamp());
+        let reading = self.motor.angle().map(|angle| Reading { angle, velocity, at });
         match self.joint.follow(reading, gap_us, is_silence) {
             None => self.fail(now),
             Some(turns) if turns.as_radians() != 0.0 => {

@@ -1,6 +1,7 @@
 //! A motor of a family whose drives have frames of their own, and the speed loop over its torque.
 
 use crate::motors::{Model, Spec};
+use crate::own::{Kind, each};
 use drivetrain::control::{Pid, PidConfig};
 use drivetrain::encoder::GearRatio;
 use drivetrain::motor::{
@@ -23,31 +24,6 @@ const MOTOR_RPM: f32 = 6_000.0;
 /// The id under which a Damiao answers.
 pub(crate) fn master_id(spec: Spec) -> u16 {
     spec.host.unwrap_or(0x10 + u16::from(spec.id))
-}
-
-/// A motor of each family that [`Own`] makes a device of.
-#[derive(Debug)]
-enum Kind {
-    Damiao(Own<damiao::Motor>),
-    Lk(Own<lk::Motor>),
-    Rmd(Own<rmd::Motor>),
-    RobStride(Own<robstride::Motor>),
-    Odrive(Own<odrive::Motor>),
-    Vesc(Own<vesc::Motor>),
-}
-
-/// Does the same with a motor of whatever family.
-macro_rules! each {
-    ($kind:expr, $own:ident => $work:expr) => {
-        match $kind {
-            Kind::Damiao($own) => $work,
-            Kind::Lk($own) => $work,
-            Kind::Rmd($own) => $work,
-            Kind::RobStride($own) => $work,
-            Kind::Odrive($own) => $work,
-            Kind::Vesc($own) => $work,
-        }
-    };
 }
 
 /// A motor that takes torques, with a speed loop of the bench, so that its gains change while it turns.

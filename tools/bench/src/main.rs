@@ -16,6 +16,8 @@ mod motors;
 mod options;
 mod outcome;
 mod outlet;
+#[path = "../../../examples/motors/own.rs"]
+mod own;
 mod pace;
 mod program;
 mod record;

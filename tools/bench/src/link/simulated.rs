@@ -3,6 +3,7 @@
 use super::{Heard, Taken};
 use crate::drive::{MOTOR_NM_PER_A, master_id};
 use crate::motors::{Model, Spec};
+use crate::own::each;
 use drivetrain::encoder::GearRatio;
 use drivetrain::frame::CanFrame;
 use drivetrain::odrive::Firmware;
@@ -192,20 +193,6 @@ fn kind(spec: Spec) -> Option<Kind> {
         }
         Model::M3508 | Model::M2006 | Model::Gm6020 | Model::Gm6020Current => return None,
     })
-}
-
-/// Does the same with a drive of whatever family.
-macro_rules! each {
-    ($kind:expr, $drive:ident => $work:expr) => {
-        match $kind {
-            Kind::Damiao($drive) => $work,
-            Kind::Lk($drive) => $work,
-            Kind::Rmd($drive) => $work,
-            Kind::RobStride($drive) => $work,
-            Kind::Odrive($drive) => $work,
-            Kind::Vesc($drive) => $work,
-        }
-    };
 }
 
 impl Kind {
