@@ -8,7 +8,7 @@ use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
 use drivetrain::error::ConfigError;
 use drivetrain::geometry::{Body, Twist, Vec2};
-use drivetrain::motor::{ArmError, Condition, Link, MotorName};
+use drivetrain::motor::{ArmError, ArmingSwitch, Condition, Link, MotorName, SwitchOrder};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{ChassisConfig, MotorConfig, MotorKey, Simulation, Wheel};
 use drivetrain::time::{Duration, Edge, Instant, Tick};
@@ -211,7 +211,7 @@ impl Parts {
             chassis,
             wheels,
             targets: Vec::new(),
-            was_on: true,
+            switch: ArmingSwitch::new(),
             is_armed: false,
         }))
     }
@@ -223,8 +223,7 @@ struct OnWheels<K: Kinematics> {
     chassis: Chassis<K>,
     wheels: K::Wheels<Handle<M3508>>,
     targets: Vec<f32>,
-    /// A switch that is on at power-on arms nothing.
-    was_on: bool,
+    switch: ArmingSwitch,
     is_armed: bool,
 }
 
@@ -236,12 +235,11 @@ impl<K: Kinematics<Speed = AngularVelocity>> Robot for OnWheels<K> {
 
     fn cycle(&mut self, tick: Tick, pilot: Pilot) -> Result<(), ArmError> {
         let mut armed = Ok(());
-        if !pilot.is_switch_on {
-            self.runner.device_mut().disarm();
-        } else if !self.was_on {
-            armed = self.runner.arm(tick);
+        match self.switch.read(Some(pilot.is_switch_on)) {
+            SwitchOrder::Arm => armed = self.runner.arm(tick),
+            SwitchOrder::Keep => {}
+            SwitchOrder::Disarm => self.runner.device_mut().disarm(),
         }
-        self.was_on = pilot.is_switch_on;
         self.is_armed = self.runner.is_armed();
         if self.is_armed {
             self.chassis.set_body(pilot.twist);
