@@ -78,7 +78,9 @@ pub(crate) use devices::ask;
 pub use drive::{AngleDrive, Measured, OneOf, TargetError, VelocityDrive};
 pub use guard::Guard;
 pub use health::{Condition, Conditions, Health, HealthConfig, Reaction};
-pub(crate) use health::{Journal, Latch, Monitor, Rival, Sample, Severity, Traffic, elapsed};
+pub(crate) use health::{
+    Journal, Latch, Monitor, Rival, Sample, Severity, Traffic, check_soft_limits, elapsed,
+};
 pub use homing::{HomingStep, StopHoming};
 pub use link::{Link, Timeouts};
 pub(crate) use link::{age, is_near, take_age};

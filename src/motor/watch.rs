@@ -1,8 +1,8 @@
 //! Health of one motor outside of a bus: its vitals, and their checks.
 
 use super::{
-    Condition, Conditions, Guard, Health, HealthConfig, Latch, Link, Monitor, MotorName, Rival,
-    Sample, Severity, Traffic, elapsed,
+    Condition, Guard, Health, HealthConfig, Latch, Link, Monitor, MotorName, Rival, Sample,
+    Severity, Traffic, elapsed,
 };
 use crate::time::{Duration, Instant};
 
@@ -47,10 +47,13 @@ impl Watch {
 
     pub(crate) fn with_config(self, config: &'static HealthConfig) -> Result<Self, &'static str> {
         config.validate()?;
-        if config.soft_limits.is_some() {
-            return Err("soft limits");
-        }
         Ok(Self { config, ..self })
+    }
+
+    /// Returns the soft limits in rad.
+    #[inline]
+    pub(crate) const fn soft_limits(&self) -> Option<(f32, f32)> {
+        self.config.soft_limits
     }
 
     /// Counts feedback before the guard takes its time.
@@ -76,16 +79,12 @@ impl Watch {
 
     /// Tells whether the motor must not be armed.
     pub(crate) fn is_faulty(&self, guard: &Guard) -> bool {
-        let fault = Conditions::NONE.with(Condition::Fault);
-        !guard.conditions().and(fault).and(self.config.relaxing()).is_empty()
+        self.config.forbids(guard.conditions())
     }
 
     /// Begins anew before the motor is driven.
     pub(crate) fn start(&mut self, guard: &mut Guard, now: Instant) {
-        for condition in Monitor::NOTICED_ANEW {
-            guard.note(condition, false, now);
-        }
-        self.monitor = Monitor::NEW;
+        guard.latch(now, |latch| self.monitor.start(latch));
     }
 
     /// Checks the motor, relaxes the motor where a condition demands rest, and returns the remaining share of the output.
@@ -128,8 +127,7 @@ impl Watch {
                 }
             });
         }
-        let begun = guard.conditions().minus(before).and(self.config.relaxing());
-        if !begun.is_empty() || self.is_faulty(guard) {
+        if self.config.relaxes(before, guard.conditions()) {
             guard.relax_until_armed();
         }
         self.share

@@ -3,7 +3,8 @@
 use crate::motors::Family;
 use crate::station::{Bend, Drive, Station};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{ArmError, Ingest, Link};
+use drivetrain::motor::{ArmError, Condition, HealthConfig, Ingest, Link};
+use drivetrain::units::Angle;
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 
 /// The outcome, or the reason that the family has no such fault.
@@ -31,6 +32,7 @@ pub(crate) const CASES: &[Case] = &[
     ("F33", |family| Ok(recovery(family.station()))),
     ("F34", |family| Ok(not_finite(family.station()))),
     ("F41", |family| Ok(not_kept(family.station()))),
+    ("F42", |family| Ok(soft_limit(family))),
     ("F43", |family| Ok(emergency_stop(family.station()))),
     ("F44", |family| Ok((family.out_of_range)().to_string())),
     ("F46", |family| Ok(two_with_one_id(&family.station()))),
@@ -54,6 +56,30 @@ fn after((rests_ms, trips_ms): (u32, Option<u32>)) -> String {
         Some(1) => format!("{rests}, tripped"),
         Some(ms) => format!("{rests}, tripped after {ms}"),
         None => rests,
+    }
+}
+
+/// A start outside of the limits, with an outward torque for 0.1 s, then an inward one.
+fn soft_limit(family: &Family) -> String {
+    static LIMITS: HealthConfig =
+        HealthConfig::new().with_soft_limits(Angle::from_radians(-1.0), Angle::from_radians(1.0));
+    let mut station = family.station();
+    station.device.set_health(&LIMITS);
+    let mut station = station.settled();
+    station.device.set_present_angle(1.5).unwrap();
+    station.device.arm(station.now()).unwrap();
+    let (mut is_pushed, mut is_driven) = (false, false);
+    for ms in 0..300 {
+        station.device.set(if ms < 100 { 1.0 } else { -1.0 }).unwrap();
+        station.step();
+        assert!(station.device.conditions().contains(Condition::SoftLimit) || ms > 100);
+        // A torque of zero is up to half a count.
+        is_pushed |= ms < 100 && station.drive.shaft().torque_nm() > 0.003;
+        is_driven |= ms >= 100 && station.drive.shaft().torque_nm() < -0.1;
+    }
+    match (is_pushed, is_driven) {
+        (false, true) => "inward only".to_owned(),
+        outcome => format!("pushed outward and driven inward: {outcome:?}"),
     }
 }
 

@@ -17,7 +17,7 @@ use drivetrain::{damiao, lk, odrive, rmd, robstride, vesc};
 use std::f32::consts::TAU;
 
 /// Each family and mode, and a motor in it.
-fn stations() -> impl Iterator<Item = (String, fn() -> Station)> {
+pub(crate) fn stations() -> impl Iterator<Item = (String, fn() -> Station)> {
     FAMILIES.iter().flat_map(|family| {
         family.modes.iter().map(|(mode, make)| (format!("{}, {mode}", family.name), *make))
     })

@@ -5,6 +5,7 @@
 mod drives;
 mod faults;
 mod joint;
+mod limits;
 mod load;
 mod motors;
 mod places;

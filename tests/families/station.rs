@@ -3,8 +3,8 @@
 use crate::drives::{raw, with_id};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    AngleDrive, ArmError, BusLoad, CanDevice, Claim, Devices, Ingest, Link, Own, OwnMotor,
-    TargetError, VelocityDrive,
+    AngleDrive, ArmError, BusLoad, CanDevice, Claim, Conditions, Devices, HealthConfig, Ingest,
+    Link, Own, OwnMotor, TargetError, VelocityDrive,
 };
 use drivetrain::sim::DriveShaft;
 use drivetrain::time::{Instant, Tick};
@@ -26,6 +26,8 @@ pub(crate) trait Device {
     /// Turns the positive direction round.
     fn reverse(&mut self);
     fn set_present_angle(&mut self, angle_rad: f32) -> Result<(), TargetError>;
+    fn set_health(&mut self, config: &'static HealthConfig);
+    fn conditions(&self) -> Conditions;
     fn angle_rad(&self) -> Option<f32>;
     fn velocity_rad_per_s(&self) -> Option<f32>;
     fn link(&self) -> Link;
@@ -77,6 +79,12 @@ impl<M: OwnMotor + Copy> Device for Driven<M> {
     }
     fn set_present_angle(&mut self, angle_rad: f32) -> Result<(), TargetError> {
         self.0.set_present_angle(Angle::from_radians(angle_rad))
+    }
+    fn set_health(&mut self, config: &'static HealthConfig) {
+        self.0 = self.0.with_health(config).unwrap();
+    }
+    fn conditions(&self) -> Conditions {
+        self.0.health().conditions
     }
     fn angle_rad(&self) -> Option<f32> {
         AngleDrive::angle(&self.0, ()).map(Angle::as_radians)

@@ -6,16 +6,10 @@ use crate::dji::{Facts, State};
 use crate::encoder::Homing;
 use crate::motor::{
     Condition, Conditions, Health, HealthConfig, Link, Monitor, MotorName, Sample, Traffic, age,
-    elapsed,
+    check_soft_limits, elapsed,
 };
 use crate::time::Duration;
 use crate::units::Current;
-
-/// Distance inside of a soft limit from which the motor is no longer at the limit.
-const CLEAR_RAD: f32 = 0.01;
-
-/// A motor with one of these conditions is not armed.
-const OBSTACLES: Conditions = Conditions::NONE.with(Condition::Fault).with(Condition::DuplicateId);
 
 /// Values of the bus for a check of a motor.
 #[derive(Debug, Clone, Copy)]
@@ -228,10 +222,7 @@ pub(in crate::dji) fn is_fit(slot: &Slot) -> bool {
 /// Takes targets from now on, beginning at rest. A condition that relaxed the motor is detected anew.
 pub(in crate::dji) fn engage(slot: &mut Slot, now: u32) {
     slot.guard.engage(now);
-    for condition in Monitor::NOTICED_ANEW {
-        slot.guard.latch_mut().set(condition, false);
-    }
-    slot.monitor = Monitor::NEW;
+    slot.monitor.start(slot.guard.latch_mut());
     begin_opening(slot);
     keep_inside(slot, 0);
 }
@@ -268,11 +259,7 @@ fn soft_limits(slot: &mut Slot, ahead: u8) -> (bool, bool) {
     let here = slot.shaft.position().as_angle().as_radians();
     // The position at the next check.
     let there = here + slot.velocity().as_rad_per_s() * (f32::from(ahead) * 1.024e-3);
-    let (below, above) = (here.min(there) <= lower, here.max(there) >= upper);
-    let lingers = slot.guard.latch().has(Condition::SoftLimit)
-        && !(here > lower + CLEAR_RAD && here < upper - CLEAR_RAD);
-    slot.guard.latch_mut().set(Condition::SoftLimit, below || above || lingers);
-    (below, above)
+    check_soft_limits(slot.guard.latch_mut(), (lower, upper), here, there)
 }
 
 fn end_what_is_over(slot: &mut Slot, seen: &Surroundings) {
@@ -296,11 +283,9 @@ fn close_window(slot: &mut Slot, window: u16, feedback_hz: u32) {
     }
 }
 
-/// Relaxes the motor if a condition with this reaction began, or an obstacle to arming holds.
+/// Relaxes the motor if its configuration says so.
 pub(super) fn react(slot: &mut Slot, before: Conditions) {
-    let active = slot.guard.latch().active();
-    let begun = active.minus(before).and(slot.health.relaxing());
-    if !begun.is_empty() || is_faulty(slot) {
+    if slot.health.relaxes(before, slot.guard.latch().active()) {
         slot.guard.trip();
     }
 }
@@ -367,7 +352,7 @@ pub(in crate::dji) fn report(slot: &Slot) -> Option<Health> {
 
 /// Tells whether the motor must not be armed.
 pub(in crate::dji) fn is_faulty(slot: &Slot) -> bool {
-    !slot.guard.latch().active().and(OBSTACLES).and(slot.health.relaxing()).is_empty()
+    slot.health.forbids(slot.guard.latch().active())
 }
 
 /// Mixes two numbers so that the upper bits change with each (Knuth's multiplicative hash).

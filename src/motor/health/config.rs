@@ -121,8 +121,35 @@ impl HealthConfig {
     /// two turns from zero.
     ///
     /// Outside, the motor is driven inward only, also if the shaft starts there; at speed, already a little before. No effect while the
-    /// absolute position is unknown: for a geared motor, until the position is set. For the motors of a [`Bus`](crate::dji::Bus); every
-    /// other motor refuses a configuration with soft limits.
+    /// absolute position is unknown: for a geared motor, until the position is set. A motor without CAN refuses soft limits.
+    ///
+    /// An [`Own`](super::Own) joint turns by the shortest way that stays inside, and to the next limit instead of an angle outside. An outward
+    /// velocity is at most the distance to the limit divided by 0.1 s. An outward torque falls to zero over the last 0.02 rad, and from half of
+    /// that velocity up to it. A drive with [`Capability::AbsoluteAngle`](super::Capability::AbsoluteAngle) has its own zero where no
+    /// [other](super::Own::with_zero) is given; a drive without has no limits before
+    /// [`set_present_angle`](super::Own::set_present_angle).
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::damiao::{Model, Motor};
+    /// use drivetrain::frame::CanFrame;
+    /// use drivetrain::motor::{CanDevice, Condition, HealthConfig, ImpedanceControl, Own};
+    /// use drivetrain::time::{Instant, Tick};
+    /// use drivetrain::units::Angle;
+    ///
+    /// static ELBOW: HealthConfig =
+    ///     HealthConfig::new().with_soft_limits(Angle::from_radians(-0.5), Angle::from_radians(1.5));
+    /// let motor = Motor::new(Model::J4310, 1, ImpedanceControl::new(3.0)?)?;
+    /// let mut elbow = Own::new(motor).with_health(&ELBOW)?;
+    /// let feedback = [0x11, 0x94, 0x7A, 0x7F, 0xF7, 0xFF, 30, 35]; // 2 rad of 12.5
+    /// let feedback = CanFrame::standard(0x011, feedback).ok_or("id")?;
+    /// for ms in 1..=2 {
+    ///     elbow.ingest(&feedback, Instant::from_micros(ms * 1_000));
+    ///     elbow.update(Tick::new(Instant::from_micros(ms * 1_000), 0.001));
+    /// }
+    /// assert!(elbow.health().conditions.contains(Condition::SoftLimit)); // 0.5 rad outside
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     #[must_use]
     pub const fn with_soft_limits(self, lower: Angle, upper: Angle) -> Self {
         Self { soft_limits: Some((lower.as_radians(), upper.as_radians())), ..self }
@@ -156,12 +183,20 @@ impl HealthConfig {
         Ok(())
     }
 
-    pub(crate) const fn ignores(&self, condition: Condition) -> bool {
-        self.ignored.contains(condition)
+    /// Tells whether a motor with these conditions must not be armed.
+    pub(crate) const fn forbids(&self, active: Conditions) -> bool {
+        const OBSTACLES: Conditions =
+            Conditions::NONE.with(Condition::Fault).with(Condition::DuplicateId);
+        !active.and(OBSTACLES).and(self.relaxing).is_empty()
     }
 
-    pub(crate) const fn relaxing(&self) -> Conditions {
-        self.relaxing
+    /// Tells whether a motor relaxes: a condition with this reaction began, or the motor must not be armed.
+    pub(crate) const fn relaxes(&self, before: Conditions, active: Conditions) -> bool {
+        !active.minus(before).and(self.relaxing).is_empty() || self.forbids(active)
+    }
+
+    pub(crate) const fn ignores(&self, condition: Condition) -> bool {
+        self.ignored.contains(condition)
     }
 
     pub(crate) const fn temperatures_c(&self) -> Option<(i16, i16)> {
@@ -229,9 +264,11 @@ mod tests {
     fn the_last_reaction_counts() {
         let stalled = Condition::Stalled;
         let config = HealthConfig::new().with_reaction(stalled, Reaction::Relax);
-        assert!(config.relaxing().contains(stalled));
+        let relaxes =
+            |config: HealthConfig| config.relaxes(Conditions::NONE, Conditions::NONE.with(stalled));
+        assert!(relaxes(config));
         let config = config.with_reaction(stalled, Reaction::Ignore);
-        assert!(!config.relaxing().contains(stalled) && config.ignores(stalled));
+        assert!(!relaxes(config) && config.ignores(stalled));
         let config = config.with_reaction(stalled, Reaction::Report);
         assert!(!config.ignores(stalled));
     }

@@ -119,9 +119,13 @@ impl Monitor {
         true
     }
 
-    /// Conditions that end when a motor is armed. If such a condition still holds, it begins again, and relaxes the motor again.
-    pub(crate) const NOTICED_ANEW: [Condition; 3] =
-        [Condition::Runaway, Condition::Stalled, Condition::Overspeed];
+    /// Begins anew as a motor is armed: a condition that still holds begins again, and relaxes the motor again.
+    pub(crate) fn start(&mut self, latch: &mut Latch) {
+        for condition in [Condition::Runaway, Condition::Stalled, Condition::Overspeed] {
+            latch.set(condition, false);
+        }
+        *self = Self::NEW;
+    }
 
     /// Notes an error code.
     pub(crate) const fn hear_error(&mut self) {
@@ -277,6 +281,24 @@ impl Runaway {
         self.highest = self.highest.max(speed);
         self.lasted >= SHORTEST && self.highest >= self.from.saturating_add(GAIN)
     }
+}
+
+/// Distance inside of a soft limit from which the motor is no longer at the limit.
+const CLEAR_RAD: f32 = 0.01;
+
+/// Compares a shaft with its soft limits, in rad, `here` and a little later `there`. Returns whether the shaft may turn up only, and whether
+/// the shaft may turn down only.
+pub(crate) fn check_soft_limits(
+    latch: &mut Latch,
+    (lower, upper): (f32, f32),
+    here: f32,
+    there: f32,
+) -> (bool, bool) {
+    let (below, above) = (here.min(there) <= lower, here.max(there) >= upper);
+    let lingers =
+        latch.has(Condition::SoftLimit) && !(here > lower + CLEAR_RAD && here < upper - CLEAR_RAD);
+    latch.set(Condition::SoftLimit, below || above || lingers);
+    (below, above)
 }
 
 /// Detects a motor that is driven and does not turn, in either direction. Returns the share of the output that stays available.

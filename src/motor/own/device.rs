@@ -1,13 +1,12 @@
 //! The motor as a device of the runner.
 
-use super::{INQUIRY, Impedance, Offered, Order, Own, OwnMotor, Target};
+use super::joint::{Inside, Start};
+use super::{INQUIRY, Offered, Order, Own, OwnMotor, Shaft, Target};
 use crate::frame::CanFrame;
-use crate::math::wrap_pi;
 use crate::motor::{
     CanDevice, Claim, Condition, Ingest, Link, MotorName, Repeat, Role, WrongSetting,
 };
 use crate::time::{Edge, Instant, Tick, TimeStep};
-use crate::units::Angle;
 use embedded_can::Frame;
 
 impl<M: OwnMotor> CanDevice for Own<M> {
@@ -195,6 +194,9 @@ impl<M: OwnMotor> Own<M> {
         if share <= 0.0 {
             self.guard.relax();
         }
+        if self.watch.soft_limits().is_some() {
+            self.check_limits(now);
+        }
         share
     }
 
@@ -288,7 +290,7 @@ impl<M: OwnMotor> Own<M> {
     /// The drive did not follow before: its output opens from zero, and its angle starts from where the shaft is.
     fn reopen(&mut self) {
         self.guard.reopen();
-        (self.start, self.start_velocity) = (None, None);
+        self.start = Start::NONE;
     }
 
     /// Returns the command of this step, or rest. If rest would disable a drive on the way to be enabled, returns the frame that asks
@@ -313,40 +315,37 @@ impl<M: OwnMotor> Own<M> {
     fn follow(&mut self, step: TimeStep, left: f32) -> CanFrame {
         self.is_resting = false;
         let opened = self.guard.share();
-        let target = if opened < 1.0 { self.goal(opened) } else { self.target };
+        let is_free = opened >= 1.0 && self.watch.soft_limits().is_none();
+        let target = if is_free { self.target } else { self.goal(opened) };
         let share = if left < opened { left } else { opened };
         self.motor.control(Order { target, share, step })
     }
 
-    /// Returns the target on its way from where the shaft was, as far as the output range is open.
+    /// Returns the target as far as the output range is open, and within the soft limits.
     fn goal(&mut self, opened: f32) -> Target {
-        let measured = self.motor.angle().filter(|angle| angle.is_finite());
-        match (self.target, measured) {
-            (Target::Angle(target), Some(measured)) => {
-                let start = *self.start.get_or_insert(measured);
-                let way = wrap_pi((target - start).as_radians());
-                Target::Angle(start + Angle::from_radians(way * opened))
-            }
-            (Target::Velocity(target), _) => {
-                let start = *self.start_velocity.get_or_insert_with(|| self.motor.velocity());
-                if start.is_finite() {
-                    Target::Velocity(start + (target - start) * opened)
-                } else {
-                    self.target
-                }
-            }
-            (Target::Impedance(target), Some(measured)) => {
-                let start = *self.start.get_or_insert(measured);
-                let way = (target.angle - start).as_radians();
-                let angle = start + Angle::from_radians(way * opened);
-                Target::Impedance(Impedance { angle, ..target })
-            }
-            (target, _) => target,
-        }
+        let (shaft, inside) = self.shaft();
+        self.start.goal(self.target, opened, shaft, inside)
+    }
+
+    fn shaft(&self) -> (Shaft, Option<Inside>) {
+        let shaft = (self.motor.angle(), self.motor.velocity());
+        let limits = self.watch.soft_limits();
+        (shaft, limits.and_then(|limits| self.joint.inside(limits, shaft)))
+    }
+
+    /// Notes whether the shaft is at a soft limit.
+    #[inline(never)]
+    fn check_limits(&mut self, now: Instant) {
+        let is_online = self.is_online();
+        let (_, inside) = self.shaft();
+        self.guard.latch(now, |latch| match inside.filter(|_| is_online) {
+            Some(inside) => inside.check(latch),
+            None => latch.set(Condition::SoftLimit, false),
+        });
     }
 
     fn relax(&mut self) {
-        (self.start, self.start_velocity) = (None, None);
+        self.start = Start::NONE;
         if !self.is_resting {
             self.motor.reset();
             self.is_resting = true;

@@ -1,8 +1,13 @@
 //! The joint on the shaft of the drive: targets and measurements in its own direction, from its own zero.
 
-use super::{Impedance, Own, OwnMotor, Target};
-use crate::motor::{AngleDrive, Capabilities, Capability, TargetError, VelocityDrive};
+use super::{Impedance, Own, OwnMotor, Shaft, Target};
+use crate::control::limited;
+use crate::math::wrap_pi;
+use crate::motor::{
+    AngleDrive, Capabilities, Capability, Latch, TargetError, VelocityDrive, check_soft_limits,
+};
 use crate::units::{Angle, AngularVelocity};
+use core::f32::consts::TAU;
 
 /// A reading of the angle, with the stamp of its feedback.
 #[derive(Debug, Clone, Copy)]
@@ -59,6 +64,13 @@ pub(super) enum Zero {
 impl Joint {
     /// The joint turns and counts as its drive.
     pub(super) const DIRECT: Self = Self { sign: 1.0, zero: Zero::OfDrive, last: None };
+
+    /// Counts the turns from the zero of the drive, unless another zero is given.
+    pub(super) const fn take_zero_of_drive(&mut self) {
+        if let Zero::OfDrive = self.zero {
+            self.zero = Zero::Given(Angle::ZERO);
+        }
+    }
 
     /// Places a given zero in the turn where the joint is heard first.
     pub(super) fn place_zero(&mut self, measured: Option<Angle>) {
@@ -126,6 +138,21 @@ impl Joint {
         Ok(self.zero().ok_or(TargetError::NotHomed)? + angle * self.sign)
     }
 
+    /// Returns the shaft between the limits of the joint; `None` while the position is not known.
+    pub(super) fn inside(&self, (lower, upper): (f32, f32), shaft: Shaft) -> Option<Inside> {
+        let zero = self.zero().filter(|_| self.depends_on_supply())?.as_radians();
+        let (one, other) = (zero + self.sign * lower, zero + self.sign * upper);
+        let here = shaft.0?.as_radians();
+        // A velocity that is no number counts as none.
+        let velocity = Some(shaft.1.as_rad_per_s()).filter(|velocity| velocity.is_finite());
+        here.is_finite().then_some(Inside {
+            lower: one.min(other),
+            upper: one.max(other),
+            here,
+            velocity: velocity.unwrap_or(0.0),
+        })
+    }
+
     /// Returns the target in the direction of the drive.
     ///
     /// # Errors
@@ -142,6 +169,148 @@ impl Joint {
                 ..impedance
             }),
         })
+    }
+}
+
+/// A shaft between its soft limits, in rad and rad/s in the direction and from the zero of the drive.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Inside {
+    lower: f32,
+    upper: f32,
+    here: f32,
+    velocity: f32,
+}
+
+/// A shaft comes no sooner to a limit than in this time, in s, at its present velocity.
+const BRAKING_S: f32 = 0.1;
+/// The way to a limit in rad over which an outward torque falls to zero.
+const FADING: f32 = 0.02;
+/// The longest way in rad to an angle, so that the shortest way leads in the same direction.
+const LONGEST_WAY: f32 = 3.0;
+
+impl Inside {
+    /// Notes whether the shaft is at a limit.
+    pub(super) fn check(&self, latch: &mut Latch) {
+        check_soft_limits(latch, (self.lower, self.upper), self.here, self.here);
+    }
+
+    /// Returns the target within the limits.
+    fn target(&self, target: Target) -> Target {
+        match target {
+            Target::Torque(torque_nm) => Target::Torque(self.torque(torque_nm)),
+            Target::Velocity(velocity) => Target::Velocity(self.velocity(velocity)),
+            Target::Angle(angle) => {
+                Target::Angle(Angle::from_radians(self.nearest(angle.as_radians())))
+            }
+            Target::Impedance(impedance) => {
+                let angle = limited(impedance.angle.as_radians(), self.lower, self.upper);
+                Target::Impedance(Impedance {
+                    angle: Angle::from_radians(angle),
+                    velocity: self.velocity(impedance.velocity),
+                    torque_nm: self.torque(impedance.torque_nm),
+                    ..impedance
+                })
+            }
+        }
+    }
+
+    /// Returns the target of the next step: no outward velocity of the start, and an angle not so far away that another way is shorter.
+    fn next(&self, target: Target) -> Target {
+        match target {
+            Target::Velocity(velocity) => Target::Velocity(self.velocity(velocity)),
+            Target::Angle(angle) => {
+                let way = limited(angle.as_radians() - self.here, -LONGEST_WAY, LONGEST_WAY);
+                Target::Angle(Angle::from_radians(self.here + way))
+            }
+            Target::Torque(_) | Target::Impedance(_) => target,
+        }
+    }
+
+    fn velocity(&self, velocity: AngularVelocity) -> AngularVelocity {
+        let least = ((self.lower - self.here) / BRAKING_S).min(0.0);
+        let most = ((self.upper - self.here) / BRAKING_S).max(0.0);
+        AngularVelocity::from_rad_per_s(limited(velocity.as_rad_per_s(), least, most))
+    }
+
+    fn torque(&self, torque_nm: f32) -> f32 {
+        let (left, outward) = if torque_nm > 0.0 {
+            (self.upper - self.here, self.velocity)
+        } else {
+            (self.here - self.lower, -self.velocity)
+        };
+        let slowness = 2.0 - 2.0 * BRAKING_S * outward / left;
+        if left > 0.0 { torque_nm * slowness.min(left / FADING).clamp(0.0, 1.0) } else { 0.0 }
+    }
+
+    /// Returns the angle of this direction within the limits to which the way is shortest; otherwise the limit next to it.
+    fn nearest(&self, angle: f32) -> f32 {
+        let angle = self.here + wrap_pi(angle - self.here);
+        let turns = [angle, angle - TAU, angle + TAU];
+        let inside = turns.into_iter().find(|angle| (self.lower..=self.upper).contains(angle));
+        let middle = 0.5 * (self.lower + self.upper);
+        let near = || limited(middle + wrap_pi(angle - middle), self.lower, self.upper);
+        inside.unwrap_or_else(near)
+    }
+}
+
+/// The shaft when a target was followed first.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Start {
+    angle: Option<Angle>,
+    velocity: Option<AngularVelocity>,
+}
+
+impl Start {
+    pub(super) const NONE: Self = Self { angle: None, velocity: None };
+
+    /// The drive counts so many turns further.
+    pub(super) fn turn(&mut self, turns: Angle) {
+        self.angle = self.angle.map(|angle| angle + turns);
+    }
+
+    /// Returns the target on its way from the start, as far as the output range is open; within the limits, if any.
+    pub(super) fn goal(
+        &mut self,
+        target: Target,
+        opened: f32,
+        shaft: Shaft,
+        inside: Option<Inside>,
+    ) -> Target {
+        let Some(inside) = inside else { return self.open(target, opened, shaft, false) };
+        inside.next(self.open(inside.target(target), opened, shaft, true))
+    }
+
+    /// Returns the target on its way. The way to an angle is the shortest one, unless it is to be `direct`.
+    fn open(
+        &mut self,
+        target: Target,
+        opened: f32,
+        (angle, velocity): Shaft,
+        is_direct: bool,
+    ) -> Target {
+        if opened >= 1.0 {
+            return target;
+        }
+        let measured = angle.filter(|angle| angle.is_finite());
+        match (target, measured) {
+            (Target::Angle(target), Some(measured)) => {
+                let start = *self.angle.get_or_insert(measured);
+                let way = target - start;
+                let way = if is_direct { way } else { way.wrapped() };
+                Target::Angle(start + way * opened)
+            }
+            (Target::Velocity(target), _) => {
+                let start = *self.velocity.get_or_insert(velocity);
+                let way = target - start;
+                Target::Velocity(if start.is_finite() { start + way * opened } else { target })
+            }
+            (Target::Impedance(target), Some(measured)) => {
+                let start = *self.angle.get_or_insert(measured);
+                let angle = start + (target.angle - start) * opened;
+                Target::Impedance(Impedance { angle, ..target })
+            }
+            (target, _) => target,
+        }
     }
 }
 
@@ -167,5 +336,89 @@ impl<M: OwnMotor> AngleDrive<()> for Own<M> {
 
     fn set_angle(&mut self, (): (), target: Angle) -> Result<(), TargetError> {
         self.set(Capability::Angle, Target::Angle(target))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn inside(here: f32, velocity: f32) -> Inside {
+        Inside { lower: -1.0, upper: 2.0, here, velocity }
+    }
+
+    fn torque(here: f32, velocity: f32, torque_nm: f32) -> f32 {
+        let spring = Impedance { torque_nm, ..Impedance::FREE };
+        let Target::Impedance(sent) = inside(here, velocity).target(Target::Impedance(spring))
+        else {
+            panic!("another kind")
+        };
+        let alone = inside(here, velocity).target(Target::Torque(torque_nm));
+        assert_eq!(alone, Target::Torque(sent.torque_nm));
+        sent.torque_nm
+    }
+
+    #[test]
+    fn an_outward_torque_fades_with_the_way_and_with_the_velocity_and_an_inward_one_never() {
+        for (here, velocity, expected) in [
+            (0.0, 0.0, 3.0),
+            (1.99, 0.0, 1.5), // half of the last 0.02 rad
+            (2.0, 0.0, 0.0),
+            (2.5, 0.0, 0.0),
+            (1.0, 5.0, 3.0), // at 10 rad/s the shaft is at the limit in 0.1 s
+            (1.0, 7.5, 1.5),
+            (1.0, 10.0, 0.0),
+            (1.0, 50.0, 0.0),
+            (1.0, -50.0, 3.0),
+            (-9.0, 0.0, 3.0),
+        ] {
+            assert!((torque(here, velocity, 3.0) - expected).abs() < 1e-4, "{here}, {velocity}");
+            let mirrored = torque(1.0 - here, -velocity, -3.0);
+            assert!((mirrored + expected).abs() < 1e-4, "{here}, {velocity}: {mirrored}");
+        }
+    }
+
+    #[test]
+    fn an_outward_velocity_is_the_way_in_a_tenth_of_a_second_and_no_target_moves_the_shaft_by_itself()
+     {
+        for (here, wanted, expected) in [
+            (0.0, 5.0, 5.0),
+            (1.9, 5.0, 1.0),
+            (2.0, 5.0, 0.0),
+            (2.5, 5.0, 0.0),
+            (2.5, -5.0, -5.0),
+            (-1.5, -5.0, 0.0),
+            (-0.9, -5.0, -1.0),
+            (-1.5, 0.0, 0.0),
+        ] {
+            let target = Target::Velocity(AngularVelocity::from_rad_per_s(wanted));
+            let Target::Velocity(sent) = inside(here, 0.0).target(target) else { panic!() };
+            assert!((sent.as_rad_per_s() - expected).abs() < 1e-4, "{here}, {wanted}: {sent:?}");
+        }
+    }
+
+    #[test]
+    fn an_angle_is_reached_inside_and_one_outside_is_the_limit_next_to_it() {
+        let wide = |here| Inside { lower: -4.0, upper: 4.0, here, velocity: 0.0 };
+        let narrow = |here| inside(here, 0.0);
+        for (inside, wanted, expected) in [
+            (narrow(0.0), 1.5, 1.5),
+            (narrow(0.0), 1.5 + TAU, 1.5),
+            (narrow(0.0), 2.3, 2.0),
+            (narrow(0.0), -1.4, -1.0),
+            (narrow(1.9), -1.4, -1.0), // although 2.98 rad upward
+            (narrow(2.5), 3.0, 2.0),
+            (wide(0.0), 3.0, 3.0),
+            (wide(3.0), -3.0, 3.283_185_5),
+            (wide(3.9), -2.0, -2.0), // 0.38 rad upward lies the limit
+            (wide(9.0), 9.0 - TAU, 9.0 - TAU),
+        ] {
+            let target = Target::Angle(Angle::from_radians(wanted));
+            let Target::Angle(sent) = inside.target(target) else { panic!() };
+            assert!((sent.as_radians() - expected).abs() < 1e-5, "{inside:?}, {wanted}: {sent:?}");
+            let Target::Angle(next) = inside.next(Target::Angle(sent)) else { panic!() };
+            let way = wrap_pi(next.as_radians() - inside.here);
+            assert!(way * (expected - inside.here) >= 0.0, "{inside:?}, {wanted}: {way}");
+        }
     }
 }

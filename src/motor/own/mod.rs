@@ -30,9 +30,9 @@ use crate::control::PidConfig;
 use crate::error::{ConfigError, finite};
 use crate::frame::CanFrame;
 use crate::time::{Duration, Instant};
-use crate::units::{Angle, AngularVelocity};
+use crate::units::Angle;
 use embedded_can::Frame;
-use joint::{Joint, Reading, Zero};
+use joint::{Joint, Reading, Start, Zero};
 use power::Power;
 use route::{Offered, Route};
 
@@ -59,10 +59,7 @@ pub struct Own<M> {
     power: Power,
     /// In the direction of the drive, as all below.
     target: Target,
-    /// The angle of the shaft when an angle target was followed first.
-    start: Option<Angle>,
-    /// The velocity of the shaft when a velocity target was followed first.
-    start_velocity: Option<AngularVelocity>,
+    start: Start,
     is_resting: bool,
     offered: Offered,
     /// The last frame taken, but for the drive's power.
@@ -97,8 +94,7 @@ impl<M: OwnMotor> Own<M> {
             watch: Watch::new(),
             power: Power::NEW,
             target: Target::Torque(0.0),
-            start: None,
-            start_velocity: None,
+            start: Start::NONE,
             is_resting: true,
             offered: Offered::NOTHING,
             last: None,
@@ -117,10 +113,14 @@ impl<M: OwnMotor> Own<M> {
     /// Sets the checks of health and their reactions, as far as the motor's [`vitals`](OwnMotor::vitals) tell.
     ///
     /// # Errors
-    /// Names the parameter without a sensible value, and `soft limits`: keep the targets within the limits of the joint.
-    pub fn with_health(self, config: &'static HealthConfig) -> Result<Self, &'static str> {
-        let watch = self.watch.with_config(config)?;
-        Ok(Self { watch, ..self })
+    /// Names the parameter without a sensible value.
+    pub fn with_health(mut self, config: &'static HealthConfig) -> Result<Self, &'static str> {
+        self.watch = self.watch.with_config(config)?;
+        let is_absolute = self.motor.capabilities().has(Capability::AbsoluteAngle);
+        if self.watch.soft_limits().is_some() && is_absolute {
+            self.joint.take_zero_of_drive();
+        }
+        Ok(self)
     }
 
     /// Returns how the motor is.
@@ -333,7 +333,7 @@ impl<M: OwnMotor> Own<M> {
             None => self.fail(now),
             Some(turns) if turns.as_radians() != 0.0 => {
                 self.target = self.target.moved(turns);
-                self.start = self.start.map(|start| start + turns);
+                self.start.turn(turns);
                 self.offered.may_repeat = Repeat::NO;
             }
             Some(_) => {}
