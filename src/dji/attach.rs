@@ -46,7 +46,7 @@ pub(super) const fn attach<const N: usize>(
         Err(error) => return Err(error),
     };
     let (count, commands) = (motors.count() + 1, outbox.frames_in_use_with(frame));
-    let rate = motors.rounds.feedback_hz;
+    let rate = motors.round.feedback_hz;
     if let Some((load, ceiling_percent, feedback_hz)) = budget.overload(count, rate, commands) {
         return Err(AttachError::Load { motor, load, ceiling_percent, feedback_hz });
     }

@@ -131,7 +131,7 @@ impl<B, const N: usize> Bus<B, N> {
     /// Declares that the driver receives its own frames: a received command frame is then no sign of a second master.
     #[must_use]
     pub const fn with_loopback(mut self) -> Self {
-        self.motors.rounds.echoes = true;
+        self.motors.round.echoes = true;
         self
     }
 
@@ -145,7 +145,7 @@ impl<B, const N: usize> Bus<B, N> {
     /// Sets the feedback rate of the ESCs in Hz, as set by RoboMaster Assistant, for [`load`](Self::load); 1000 by default.
     #[must_use]
     pub const fn with_feedback_rate(mut self, hz: u32) -> Self {
-        self.motors.rounds.feedback_hz = hz;
+        self.motors.round.feedback_hz = hz;
         self
     }
 
@@ -261,7 +261,7 @@ impl<B, const N: usize> Bus<B, N> {
     #[must_use]
     pub const fn load(&self) -> BusLoad {
         let (motors, commands) = (self.motors.count(), self.outbox.frames_in_use());
-        self.budget.load(motors, self.motors.rounds.feedback_hz, commands)
+        self.budget.load(motors, self.motors.round.feedback_hz, commands)
     }
 
     /// Takes a frame received at `now`. Runs in constant time for a frame without an error code. Until the first update, each frame also
@@ -337,13 +337,13 @@ impl<B, const N: usize> Bus<B, N> {
     /// Checks the next motor in turn.
     #[inline(always)]
     fn check_next(&mut self) {
-        let index = self.motors.rounds.next;
+        let index = self.motors.round.next;
         let Some(slot) = self.motors.slots.get_mut(usize::from(index)) else {
             return watch::check_without_slot(&mut self.motors, &self.outbox);
         };
-        self.motors.rounds.next = index + 1;
+        self.motors.round.next = index + 1;
         let word = self.outbox.get(slot.place);
-        if !slot.is_well(word, self.motors.rounds.elapsed) {
+        if !slot.is_well(word, self.motors.round.elapsed) {
             watch::check(&mut self.motors, index, word);
         }
     }

@@ -1,7 +1,7 @@
 //! Motors of a bus in their slots, and the handles of motors.
 
 use super::outbox::Outbox;
-use super::slot::health::Rounds;
+use super::slot::health::CheckRound;
 use super::slot::{Key, Slot};
 use super::{CommandFrame, Model};
 use crate::frame::CanFrame;
@@ -32,7 +32,7 @@ pub(super) const fn is_of_others(frame: &CanFrame) -> bool {
 pub(super) struct Motors<const N: usize> {
     pub(super) slots: [Slot; N],
     pub(super) guard: DeviceGuard<12>,
-    pub(super) rounds: Rounds,
+    pub(super) round: CheckRound,
     /// The slot of each feedback id, from the lowest on; [`NOBODY`](Self::NOBODY) without a motor.
     ///
     /// Not used if there are as many slots as ids: each id then has the slot of its number.
@@ -47,7 +47,7 @@ impl<const N: usize> Motors<N> {
     pub(super) const NONE: Self = Self {
         slots: [Slot::FREE; N],
         guard: DeviceGuard::NEW,
-        rounds: Rounds::NEW,
+        round: CheckRound::NEW,
         places: [Self::NOBODY; IDS],
         used: 0,
     };

@@ -6,7 +6,7 @@
 
 use super::motors::{FIRST_FEEDBACK_ID, IDS, Motors};
 use super::outbox::Outbox;
-use super::slot::health::Rounds;
+use super::slot::health::CheckRound;
 use super::slot::{Slot, Surroundings, gap, health};
 use super::{CommandFrame, Feedback};
 use crate::frame::CanFrame;
@@ -166,16 +166,16 @@ pub(super) fn hold<const N: usize>(
 #[cold]
 #[inline(never)]
 pub(super) fn check_without_slot<const N: usize>(motors: &mut Motors<N>, outbox: &Outbox) {
-    let index = motors.rounds.next & !Rounds::CLOSING;
+    let index = motors.round.next & !CheckRound::CLOSING;
     match motors.slots.get(usize::from(index)) {
         Some(slot) => {
             let word = outbox.get(slot.place);
-            motors.rounds.next += 1;
+            motors.round.next += 1;
             check(motors, index, word);
         }
         // A round has a turn for each id: it takes the same time on every bus.
-        None if usize::from(index) < IDS => motors.rounds.next += 1,
-        None => motors.rounds.begin(motors.guard.now()),
+        None if usize::from(index) < IDS => motors.round.next += 1,
+        None => motors.round.begin(motors.guard.now()),
     }
 }
 
@@ -185,11 +185,11 @@ pub(super) fn check<const N: usize>(motors: &mut Motors<N>, index: u8, word: i16
     let now = motors.guard.now();
     let seen = Surroundings {
         now,
-        elapsed: motors.rounds.elapsed,
+        elapsed: motors.round.elapsed,
         word,
-        window: motors.rounds.window(),
-        feedback_hz: motors.rounds.feedback_hz,
-        is_alone: Rival::is_gone(now, motors.rounds.rival_heard),
+        window: motors.round.window(),
+        feedback_hz: motors.round.feedback_hz,
+        is_alone: Rival::is_gone(now, motors.round.rival_heard),
     };
     motors.change(index, motors.guard.updated(), |slot| health::check(slot, &seen));
 }
@@ -197,10 +197,10 @@ pub(super) fn check<const N: usize>(motors: &mut Motors<N>, index: u8, word: i16
 /// Takes a frame of another node that may be a command of this bus.
 fn hear_command<const N: usize>(motors: &mut Motors<N>, outbox: &Outbox, id: u32, now: Instant) {
     let Some(frame) = CommandFrame::with_id(id) else { return };
-    if motors.rounds.echoes || !outbox.is_in_use(frame) {
+    if motors.round.echoes || !outbox.is_in_use(frame) {
         return;
     }
-    motors.rounds.rival_heard = now.stamp();
+    motors.round.rival_heard = now.stamp();
     motors.change_all(now, |slot| {
         if slot.facts().is_some() && slot.place.frame() == frame {
             health::hear_rival(slot);

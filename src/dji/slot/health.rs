@@ -28,7 +28,7 @@ pub(in crate::dji) struct Surroundings {
 
 /// The motor to check next, and the times of the round.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::dji) struct Rounds {
+pub(in crate::dji) struct CheckRound {
     /// Begin of the present counting window.
     window_from: u32,
     /// Time of the last command frame of another node.
@@ -48,7 +48,7 @@ pub(in crate::dji) struct Rounds {
     pub(in crate::dji) echoes: bool,
 }
 
-impl Rounds {
+impl CheckRound {
     pub(in crate::dji) const NEW: Self = Self {
         window_from: 0,
         rival_heard: 0,
