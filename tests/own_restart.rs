@@ -5,8 +5,8 @@
 
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    AngleDrive, Capabilities, Capability, Claim, Devices, Ingest, Malformed, MotorName, Order, Own,
-    OwnMotor, Role, Target, Timeouts,
+    AngleDrive, Capabilities, Capability, Claim, Condition, Devices, HealthConfig, Ingest,
+    Malformed, MotorName, Order, Own, OwnMotor, Role, Target, TargetError, Timeouts,
 };
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
@@ -49,7 +49,7 @@ impl OwnMotor for Plain {
     }
 
     fn angle(&self) -> Option<Angle> {
-        Some(Angle::from_radians(self.angle))
+        self.angle.is_finite().then(|| Angle::from_radians(self.angle))
     }
 
     fn rest(&mut self) -> CanFrame {
@@ -191,4 +191,119 @@ fn a_healthy_joint_keeps_its_zero() {
     bench.hear(3, 0.1, f32::NAN);
     bench.hear(4, 0.2, f32::NAN);
     assert_near(bench.angle(), 0.2);
+}
+
+static WIDE: HealthConfig =
+    HealthConfig::new().with_soft_limits(Angle::from_degrees(-270.0), Angle::from_degrees(270.0));
+
+/// A joint with soft limits wider than a turn, whose drive counts so far.
+fn limited(is_absolute: bool, angle: f32) -> Bench {
+    let drive = Plain { angle, velocity: 0.0, is_absolute };
+    let own = Own::new(drive).with_opening(Duration::ZERO).with_health(&WIDE).unwrap();
+    let mut bench = Bench(own);
+    bench.hear(1, angle, 0.0);
+    bench.update(1, 0.001);
+    bench
+}
+
+fn edges(bench: &mut Bench) -> Vec<(Condition, bool)> {
+    std::iter::from_fn(|| bench.0.next_edge()).map(|edge| (edge.condition, edge.began)).collect()
+}
+
+/// The program starts again, and the drive has kept its count.
+#[test]
+fn a_joint_with_soft_limits_counts_as_its_drive_and_keeps_its_turns_over_a_restart() {
+    let mut bench = limited(true, 3.5);
+    assert_near(bench.angle(), 3.5);
+    bench.hear(2, 3.5 - TAU, 0.0);
+    assert_near(bench.angle(), 3.5);
+}
+
+/// Further than a turn from its zero, a drive has not started again: the joint has turned in a silence.
+#[test]
+fn a_joint_that_turned_in_a_silence_is_where_its_drive_counts() {
+    let mut bench = limited(true, 0.3);
+    for (ms, angle) in [(500, 6.4), (1_000, -7.0)] {
+        bench.hear(ms, angle, 0.0);
+        assert_near(bench.angle(), angle);
+    }
+}
+
+#[test]
+fn a_joint_with_soft_limits_rests_while_its_angle_is_not_known() {
+    let mut bench = limited(true, 4.5);
+    bench.0.arm(at_ms(1)).unwrap();
+    bench.0.set_angle((), Angle::from_radians(4.6)).unwrap();
+    bench.hear(2, 4.5, 0.0);
+    assert_near(bench.update(2, 0.001), 4.6);
+    bench.hear(3, f32::NAN, 0.0);
+    bench.0.set_angle((), Angle::from_radians(4.6)).unwrap();
+    assert_eq!(bench.update(3, 0.001), None);
+    assert!(bench.0.health().conditions.contains(Condition::SoftLimit));
+    bench.hear(4, 4.5, 0.0);
+    bench.0.set_angle((), Angle::from_radians(4.6)).unwrap();
+    assert_near(bench.update(4, 0.001), 4.6);
+}
+
+#[test]
+fn a_lost_zero_is_an_edge_until_it_is_set_again() {
+    let mut bench = limited(false, 1.5);
+    bench.0.set_present_angle(Angle::ZERO).unwrap();
+    bench.update(2, 0.001);
+    edges(&mut bench);
+    bench.hear(3, 0.0, 0.0);
+    bench.hear(4, 9.0, 0.0);
+    bench.update(4, 0.001);
+    assert!(edges(&mut bench).contains(&(Condition::PositionUncertain, true)));
+    bench.0.set_present_angle(Angle::ZERO).unwrap();
+    assert_eq!(edges(&mut bench).last(), Some(&(Condition::PositionUncertain, false)));
+}
+
+#[test]
+fn a_forgotten_zero_takes_the_limits_with_it() {
+    let mut bench = limited(false, 1.5);
+    bench.0.set_present_angle(Angle::from_degrees(300.0)).unwrap();
+    bench.update(2, 0.001);
+    assert!(bench.0.health().conditions.contains(Condition::SoftLimit));
+    bench.0.forget_zero();
+    bench.update(3, 0.001);
+    assert!(!bench.0.health().conditions.contains(Condition::SoftLimit));
+    bench.0.arm(at_ms(3)).unwrap();
+    assert_eq!(bench.0.set_angle((), Angle::ZERO), Err(TargetError::NotHomed));
+}
+
+/// A motion from where the shaft is, in the time of an opening.
+#[test]
+fn a_new_zero_beyond_a_limit_moves_the_joint_back_from_where_it_is() {
+    let mut bench = limited(true, 0.0);
+    bench.0 = bench.0.with_opening(Duration::from_millis(200));
+    bench.0.arm(at_ms(1)).unwrap();
+    for ms in 2..400 {
+        bench.hear(ms, 0.0, 0.0);
+        bench.0.set_angle((), Angle::ZERO).unwrap();
+        bench.update(ms, 0.001);
+    }
+    bench.0.set_present_angle(Angle::from_degrees(360.0)).unwrap();
+    for ms in 400..601 {
+        bench.hear(ms, 0.0, 0.0);
+        bench.0.set_angle((), Angle::from_degrees(360.0)).unwrap();
+        let sent = bench.update(ms, 0.001).unwrap();
+        let expected = -0.5 * PI * (ms - 400) as f32 / 200.0;
+        assert!((sent - expected).abs() < 0.02, "{ms} ms: {sent} rad");
+    }
+}
+
+/// Feedback that comes and goes tells the limit once.
+#[test]
+fn a_joint_at_a_limit_is_told_once_over_late_feedback() {
+    let mut bench = limited(true, 4.8);
+    let mut begun = 0;
+    for ms in 2..200 {
+        if ms % 15 < 2 {
+            bench.hear(ms, 4.8, 0.0);
+        }
+        bench.update(ms, 0.001);
+        begun += edges(&mut bench).iter().filter(|edge| edge.0 == Condition::SoftLimit).count();
+    }
+    assert_eq!(begun, 1);
 }

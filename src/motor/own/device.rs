@@ -194,7 +194,7 @@ impl<M: OwnMotor> Own<M> {
         if share <= 0.0 {
             self.guard.relax();
         }
-        if self.watch.soft_limits().is_some() {
+        if self.watch.soft_limits().is_some() && self.is_online() {
             self.check_limits(now);
         }
         share
@@ -288,7 +288,7 @@ impl<M: OwnMotor> Own<M> {
     }
 
     /// The drive did not follow before: its output opens from zero, and its angle starts from where the shaft is.
-    fn reopen(&mut self) {
+    pub(super) fn reopen(&mut self) {
         self.guard.reopen();
         self.start = Start::NONE;
     }
@@ -327,7 +327,7 @@ impl<M: OwnMotor> Own<M> {
         self.start.goal(self.target, opened, shaft, inside)
     }
 
-    fn shaft(&self) -> (Shaft, Option<Inside>) {
+    pub(super) fn shaft(&self) -> (Shaft, Option<Inside>) {
         let shaft = (self.motor.angle(), self.motor.velocity());
         let limits = self.watch.soft_limits();
         (shaft, limits.and_then(|limits| self.joint.inside(limits, shaft)))
@@ -336,12 +336,12 @@ impl<M: OwnMotor> Own<M> {
     /// Notes whether the shaft is at a soft limit.
     #[inline(never)]
     fn check_limits(&mut self, now: Instant) {
-        let is_online = self.is_online();
-        let (_, inside) = self.shaft();
-        self.guard.latch(now, |latch| match inside.filter(|_| is_online) {
-            Some(inside) => inside.check(latch),
-            None => latch.set(Condition::SoftLimit, false),
-        });
+        let ((angle, _), inside) = self.shaft();
+        let is_lost = angle.is_none() && self.joint.has_limits();
+        if is_lost {
+            self.guard.relax();
+        }
+        self.guard.latch(now, |latch| Inside::check(inside, is_lost, latch));
     }
 
     fn relax(&mut self) {

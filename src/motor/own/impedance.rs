@@ -175,8 +175,8 @@ impl ImpedanceControl {
         let change = limited(wanted.velocity.as_rad_per_s(), -end, end) - velocity.as_rad_per_s();
         // A velocity at the end of its range is there or beyond: a damper of the drive could pass the limit, a torque cannot.
         if damping > 0.0 && velocity.as_rad_per_s().abs() >= end - 0.5 * per_count_s {
-            let sum = torque_nm + stiffness * way + damping * change;
-            let torque_nm = limited(sum, -limit, limit);
+            let spring_nm = limited(torque_nm + stiffness * way, -limit, limit);
+            let torque_nm = limited(spring_nm + damping * change, -limit, limit);
             self.effort = torque_nm / self.torque_limit_nm;
             return Some(Impedance { torque_nm, ..Impedance::FREE });
         }

@@ -4,7 +4,8 @@ use super::{Impedance, Own, OwnMotor, Shaft, Target};
 use crate::control::limited;
 use crate::math::wrap_pi;
 use crate::motor::{
-    AngleDrive, Capabilities, Capability, Latch, TargetError, VelocityDrive, check_soft_limits,
+    AngleDrive, Capabilities, Capability, Condition, Latch, TargetError, VelocityDrive,
+    check_soft_limits,
 };
 use crate::units::{Angle, AngularVelocity};
 use core::f32::consts::TAU;
@@ -65,10 +66,10 @@ impl Joint {
     /// The joint turns and counts as its drive.
     pub(super) const DIRECT: Self = Self { sign: 1.0, zero: Zero::OfDrive, last: None };
 
-    /// Counts the turns from the zero of the drive, unless another zero is given.
-    pub(super) const fn take_zero_of_drive(&mut self) {
+    /// Counts from the zero of the drive as the drive does, and over a loss of the supply, unless another zero is given.
+    pub(super) const fn keep_zero_of_drive(&mut self) {
         if let Zero::OfDrive = self.zero {
-            self.zero = Zero::Given(Angle::ZERO);
+            self.zero = Zero::Placed(Angle::ZERO);
         }
     }
 
@@ -108,6 +109,10 @@ impl Joint {
         let is_usual = |way: Angle| !is_silence && way.as_radians().abs() <= furthest;
         match &mut self.zero {
             _ if is_usual(way) => Some(Angle::ZERO),
+            // Within a turn of its zero a drive may have started again, further away it has not.
+            Zero::Placed(_) if is_silence && reading.angle.as_radians().abs() > TAU => {
+                Some(Angle::ZERO)
+            }
             _ if !is_silence && gap_s > known_s => self.lose_zero(),
             Zero::Placed(zero) => {
                 *zero = *zero + turns;
@@ -122,8 +127,12 @@ impl Joint {
     }
 
     const fn lose_zero(&mut self) -> Option<Angle> {
-        (self.zero, self.last) = (Zero::Lost, None);
+        self.forget_zero();
         None
+    }
+
+    pub(super) const fn forget_zero(&mut self) {
+        (self.zero, self.last) = (Zero::Lost, None);
     }
 
     const fn zero(&self) -> Option<Angle> {
@@ -138,9 +147,14 @@ impl Joint {
         Ok(self.zero().ok_or(TargetError::NotHomed)? + angle * self.sign)
     }
 
-    /// Returns the shaft between the limits of the joint; `None` while the position is not known.
+    /// Tells whether limits of the joint count: the joint has a zero.
+    pub(super) const fn has_limits(&self) -> bool {
+        self.depends_on_supply()
+    }
+
+    /// Returns the shaft between the limits of the joint; `None` without a zero or an angle.
     pub(super) fn inside(&self, (lower, upper): (f32, f32), shaft: Shaft) -> Option<Inside> {
-        let zero = self.zero().filter(|_| self.depends_on_supply())?.as_radians();
+        let zero = self.zero().filter(|_| self.has_limits())?.as_radians();
         let (one, other) = (zero + self.sign * lower, zero + self.sign * upper);
         let here = shaft.0?.as_radians();
         // A velocity that is no number counts as none.
@@ -183,15 +197,25 @@ pub(super) struct Inside {
 
 /// A shaft comes no sooner to a limit than in this time, in s, at its present velocity.
 const BRAKING_S: f32 = 0.1;
+/// Below this velocity in rad/s, a torque brakes in proportion to the velocity.
+const SLOW: f32 = 0.5;
 /// The way to a limit in rad over which an outward torque falls to zero.
 const FADING: f32 = 0.02;
 /// The longest way in rad to an angle, so that the shortest way leads in the same direction.
 const LONGEST_WAY: f32 = 3.0;
 
 impl Inside {
-    /// Notes whether the shaft is at a limit.
-    pub(super) fn check(&self, latch: &mut Latch) {
-        check_soft_limits(latch, (self.lower, self.upper), self.here, self.here);
+    /// Tells whether the shaft is beyond a limit.
+    pub(super) const fn is_outside(&self) -> bool {
+        self.here < self.lower || self.here > self.upper
+    }
+
+    /// Notes whether the shaft is at a limit, or so near that a target beyond leads no further.
+    pub(super) fn check(inside: Option<Self>, is_lost: bool, latch: &mut Latch) {
+        let Some(Self { lower, upper, here, .. }) = inside else {
+            return latch.set(Condition::SoftLimit, is_lost);
+        };
+        check_soft_limits(latch, (lower + FADING, upper - FADING), here, here);
     }
 
     /// Returns the target within the limits.
@@ -238,18 +262,27 @@ impl Inside {
         } else {
             (self.here - self.lower, -self.velocity)
         };
-        let slowness = 2.0 - 2.0 * BRAKING_S * outward / left;
-        if left > 0.0 { torque_nm * slowness.min(left / FADING).clamp(0.0, 1.0) } else { 0.0 }
+        let left = left.max(0.0);
+        let most = left / BRAKING_S;
+        // Below zero, the torque brakes.
+        let share = 2.0 * (most - outward) / most.max(SLOW);
+        torque_nm * share.min(1.0).min(left / FADING).max(-1.0)
     }
 
-    /// Returns the angle of this direction within the limits to which the way is shortest; otherwise the limit next to it.
+    /// Returns the angle of this direction within the limits to which the way is shortest; otherwise the limit next to it. Of limits a turn
+    /// and more apart, an angle outside is the limit.
     fn nearest(&self, angle: f32) -> f32 {
-        let angle = self.here + wrap_pi(angle - self.here);
-        let turns = [angle, angle - TAU, angle + TAU];
-        let inside = turns.into_iter().find(|angle| (self.lower..=self.upper).contains(angle));
+        let bounded = |angle| limited(angle, self.lower, self.upper);
+        let is_wide = self.upper - self.lower >= TAU;
+        if is_wide && bounded(angle) != angle {
+            return bounded(angle);
+        }
+        // A sum near a limit is rounded to either side.
+        let is_inside = |angle: &f32| (angle - bounded(*angle)).abs() < 1e-3;
+        let first = self.here + wrap_pi(angle - self.here);
+        let inside = [first, first - TAU, first + TAU].into_iter().find(is_inside);
         let middle = 0.5 * (self.lower + self.upper);
-        let near = || limited(middle + wrap_pi(angle - middle), self.lower, self.upper);
-        inside.unwrap_or_else(near)
+        bounded(inside.unwrap_or_else(|| middle + wrap_pi(angle - middle)))
     }
 }
 
@@ -342,6 +375,7 @@ impl<M: OwnMotor> AngleDrive<()> for Own<M> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::vec::Vec;
 
     fn inside(here: f32, velocity: f32) -> Inside {
         Inside { lower: -1.0, upper: 2.0, here, velocity }
@@ -359,16 +393,21 @@ mod tests {
     }
 
     #[test]
-    fn an_outward_torque_fades_with_the_way_and_with_the_velocity_and_an_inward_one_never() {
+    fn an_outward_torque_fades_then_brakes_with_way_and_velocity_and_an_inward_one_stays() {
         for (here, velocity, expected) in [
             (0.0, 0.0, 3.0),
-            (1.99, 0.0, 1.5), // half of the last 0.02 rad
+            (1.99, 0.0, 1.2),  // 2 * 0.1 rad/s of 0.5
+            (1.99, -0.5, 1.5), // half of the last 0.02 rad
             (2.0, 0.0, 0.0),
             (2.5, 0.0, 0.0),
+            (2.5, 0.125, -1.5),
+            (2.5, 7.0, -3.0),
+            (2.5, -7.0, 0.0),
             (1.0, 5.0, 3.0), // at 10 rad/s the shaft is at the limit in 0.1 s
             (1.0, 7.5, 1.5),
             (1.0, 10.0, 0.0),
-            (1.0, 50.0, 0.0),
+            (1.0, 12.5, -1.5),
+            (1.0, 50.0, -3.0),
             (1.0, -50.0, 3.0),
             (-9.0, 0.0, 3.0),
         ] {
@@ -398,6 +437,22 @@ mod tests {
     }
 
     #[test]
+    fn an_angle_at_a_limit_or_opposite_the_middle_stays_on_one_side() {
+        for (lower, upper, wanted) in [(-4.712_389, 4.712_389, 4.712_389), (-1.5, 1.5, 3.141_592_7)]
+        {
+            let mut angles = Vec::new();
+            for step in 0_u8..200 {
+                let here = upper - 0.001 * f32::from(step);
+                angles.push(Inside { lower, upper, here, velocity: 0.0 }.nearest(wanted));
+            }
+            assert!(
+                angles.iter().all(|angle| angle.to_bits() == angles[0].to_bits()),
+                "{angles:?}"
+            );
+        }
+    }
+
+    #[test]
     fn an_angle_is_reached_inside_and_one_outside_is_the_limit_next_to_it() {
         let wide = |here| Inside { lower: -4.0, upper: 4.0, here, velocity: 0.0 };
         let narrow = |here| inside(here, 0.0);
@@ -412,6 +467,9 @@ mod tests {
             (wide(3.0), -3.0, 3.283_185_5),
             (wide(3.9), -2.0, -2.0), // 0.38 rad upward lies the limit
             (wide(9.0), 9.0 - TAU, 9.0 - TAU),
+            (wide(4.0), 4.0, 4.0),
+            (wide(3.2), 4.5, 4.0), // a limit, and not 4.5 rad less a turn
+            (wide(0.0), -4.5, -4.0),
         ] {
             let target = Target::Angle(Angle::from_radians(wanted));
             let Target::Angle(sent) = inside.target(target) else { panic!() };

@@ -23,7 +23,7 @@ pub(crate) use registers::{
 pub(crate) use settings::{Inquiry, Preparation, Settings, TimeoutUnits};
 
 use super::{
-    BusLoad, Capability, Claim, Guard, Health, HealthConfig, Ingest, Link, Repeat, Role,
+    BusLoad, Capability, Claim, Condition, Guard, Health, HealthConfig, Ingest, Link, Repeat, Role,
     TargetError, Timeouts, Vitals, Watch,
 };
 use crate::control::PidConfig;
@@ -116,9 +116,8 @@ impl<M: OwnMotor> Own<M> {
     /// Names the parameter without a sensible value.
     pub fn with_health(mut self, config: &'static HealthConfig) -> Result<Self, &'static str> {
         self.watch = self.watch.with_config(config)?;
-        let is_absolute = self.motor.capabilities().has(Capability::AbsoluteAngle);
-        if self.watch.soft_limits().is_some() && is_absolute {
-            self.joint.take_zero_of_drive();
+        if config.soft_limits.is_some() && self.is_absolute() {
+            self.joint.keep_zero_of_drive();
         }
         Ok(self)
     }
@@ -155,7 +154,7 @@ impl<M: OwnMotor> Own<M> {
     /// [`ConfigError::NotFinite`]; [`ConfigError::Unsupported`] for a drive without [`Capability::AbsoluteAngle`].
     pub fn with_zero(mut self, angle: Angle) -> Result<Self, ConfigError> {
         finite("zero", angle.as_radians())?;
-        if !self.motor.capabilities().has(Capability::AbsoluteAngle) {
+        if !self.is_absolute() {
             return Err(ConfigError::Unsupported("zero"));
         }
         self.joint.zero = Zero::Given(angle);
@@ -195,9 +194,18 @@ impl<M: OwnMotor> Own<M> {
             return Err(TargetError::NotFinite);
         }
         let zero = measured - angle * self.joint.sign;
-        let is_absolute = self.motor.capabilities().has(Capability::AbsoluteAngle);
-        self.joint.zero = if is_absolute { Zero::Placed(zero) } else { Zero::Found(zero) };
+        self.joint.zero = if self.is_absolute() { Zero::Placed(zero) } else { Zero::Found(zero) };
+        self.guard.note(Condition::PositionUncertain, false, self.guard.device.updated());
+        if self.shaft().1.is_some_and(|inside| inside.is_outside()) {
+            self.reopen();
+        }
         Ok(())
+    }
+
+    /// Forgets the zero of the joint, to look for it again. Until [`set_present_angle`](Self::set_present_angle), the joint has no angle, takes
+    /// no angle as a target, and has no soft limits.
+    pub const fn forget_zero(&mut self) {
+        self.joint.forget_zero();
     }
 
     /// Changes the motor's loops of this crate, from rad to rad/s and from rad/s to Nm, also while the motor is driven: each goes on as
@@ -251,12 +259,14 @@ impl<M: OwnMotor> Own<M> {
     pub fn load(&self, bit_rate: u32, updates_hz: u32) -> BusLoad {
         let sent_hz = updates_hz.saturating_add(updates_hz.min(POWER_HZ));
         let answered_hz = sent_hz.checked_div(self.motor.frames_per_answer()).unwrap_or(0);
-        let rate = |role| if role == Role::Command { sent_hz } else { answered_hz };
-        [Role::Command, Role::Feedback].into_iter().fold(BusLoad::new(bit_rate), |load, role| {
-            let claim = self.motor.claims().into_iter().find(|claim| claim.role() == role);
-            claim
-                .map_or(load, |claim| load.with_each(&CanFrame::of(claim.id(), [0; 8]), rate(role)))
-        })
+        let mut load = BusLoad::new(bit_rate);
+        for (role, hz) in [(Role::Command, sent_hz), (Role::Feedback, answered_hz)] {
+            if let Some(claim) = self.motor.claims().into_iter().find(|claim| claim.role() == role)
+            {
+                load = load.with_each(&CanFrame::of(claim.id(), [0; 8]), hz);
+            }
+        }
+        load
     }
 
     /// Sets the torque of the output shaft in Nm; positive is counter-clockwise.
@@ -285,6 +295,10 @@ impl<M: OwnMotor> Own<M> {
         self.guard.admit(of_drive.unwrap_or(target).is_finite())?;
         self.target = of_drive.inspect_err(|_| self.guard.relax())?;
         Ok(())
+    }
+
+    fn is_absolute(&self) -> bool {
+        self.motor.capabilities().has(Capability::AbsoluteAngle)
     }
 
     fn measured_angle(&self) -> Option<Angle> {
@@ -330,7 +344,10 @@ impl<M: OwnMotor> Own<M> {
         let (velocity, at) = (self.motor.velocity(), now.stamp());
         let reading = self.motor.angle().map(|angle| Reading { angle, velocity, at });
         match self.joint.follow(reading, gap_us, is_silence) {
-            None => self.fail(now),
+            None => {
+                self.guard.note(Condition::PositionUncertain, true, now);
+                self.fail(now);
+            }
             Some(turns) if turns.as_radians() != 0.0 => {
                 self.target = self.target.moved(turns);
                 self.start.turn(turns);
@@ -344,7 +361,10 @@ impl<M: OwnMotor> Own<M> {
     fn hear(&mut self, gap_us: Option<u32>, now: Instant) {
         self.watch.hear(gap_us, now);
         self.guard.hear(now);
-        self.hear_power(now);
+        if self.power.hear(self.motor.is_enabled(), now) {
+            self.fail(now);
+            self.motor.forget_settings();
+        }
     }
 
     #[inline(never)]
@@ -370,14 +390,6 @@ impl<M: OwnMotor> Own<M> {
             self.watch.hear_rival(now);
         }
         outcome
-    }
-
-    /// Takes the drive's report of its power.
-    fn hear_power(&mut self, now: Instant) {
-        if self.power.hear(self.motor.is_enabled(), now) {
-            self.fail(now);
-            self.motor.forget_settings();
-        }
     }
 
     /// Trips the motor as by a fault that the drive reports in one update.
