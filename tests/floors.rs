@@ -976,7 +976,7 @@ const METHODS_OF_CORE: [&str; 47] = [
 ];
 
 /// The circles that are left. Folder, files, reason.
-const CIRCLES: [(&str, &str, &str); 8] = [
+const CIRCLES: [(&str, &str, &str); 7] = [
     (
         "chassis",
         "steering swerve",
@@ -994,7 +994,6 @@ const CIRCLES: [(&str, &str, &str); 8] = [
     ),
     ("geometry", "rotation2 rotation3", "each rotation is made from the other"),
     ("motor/own", ". joint route", "an own motor is configured in `joint`: two files of one type"),
-    ("runner", ". port supervision", "the runner and its settings are two files of one type"),
     (
         "sim",
         ". chassis engine esc fault joint line motor port rotor",
