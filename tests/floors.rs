@@ -976,16 +976,11 @@ const METHODS_OF_CORE: [&str; 47] = [
 ];
 
 /// The circles that are left. Folder, files, reason.
-const CIRCLES: [(&str, &str, &str); 7] = [
+const CIRCLES: [(&str, &str, &str); 6] = [
     (
         "chassis",
         "steering swerve",
         "the layout of a swerve chassis and its steering are two files of one type",
-    ),
-    (
-        "control/pid",
-        ". law",
-        "the parts of a step are below both laws, and a loop of errors is a `Pid` for its options",
     ),
     (
         "encoder",
