@@ -976,16 +976,11 @@ const METHODS_OF_CORE: [&str; 47] = [
 ];
 
 /// The circles that are left. Folder, files, reason.
-const CIRCLES: [(&str, &str, &str); 6] = [
+const CIRCLES: [(&str, &str, &str); 5] = [
     (
         "chassis",
         "steering swerve",
         "the layout of a swerve chassis and its steering are two files of one type",
-    ),
-    (
-        "encoder",
-        ". shaft",
-        "a shaft has a gear, and the turns of a drive are a position: `shaft` has 400 lines",
     ),
     ("geometry", "rotation2 rotation3", "each rotation is made from the other"),
     ("motor/own", ". joint route", "an own motor is configured in `joint`: two files of one type"),
