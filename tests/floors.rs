@@ -976,13 +976,12 @@ const METHODS_OF_CORE: [&str; 47] = [
 ];
 
 /// The circles that are left. Folder, files, reason.
-const CIRCLES: [(&str, &str, &str); 5] = [
+const CIRCLES: [(&str, &str, &str); 4] = [
     (
         "chassis",
         "steering swerve",
         "the layout of a swerve chassis and its steering are two files of one type",
     ),
-    ("geometry", "rotation2 rotation3", "each rotation is made from the other"),
     ("motor/own", ". joint route", "an own motor is configured in `joint`: two files of one type"),
     (
         "sim",

@@ -3,7 +3,7 @@
 #[cfg(feature = "serde")]
 use super::is_unit;
 use super::rotation2::angle_of;
-use super::{Heading, TOLERANCE, Vec3};
+use super::{Heading, TOLERANCE, Vec3, unit_scale};
 use crate::error::ConfigError;
 use crate::math::{sin_cos, sqrt};
 use crate::time::Instant;
@@ -75,11 +75,7 @@ impl Rotation3 {
         if !(w.is_finite() && vector.is_finite()) {
             return Err(ConfigError::NotFinite("quaternion"));
         }
-        let square = w * w + vector.dot(vector);
-        if !(1e-12..=1e12).contains(&square) {
-            return Err(ConfigError::Unusable("quaternion"));
-        }
-        let scale = 1.0 / sqrt(square);
+        let scale = unit_scale(w * w + vector.dot(vector))?;
         Ok(Self { w: w * scale, vector: vector * scale })
     }
 
