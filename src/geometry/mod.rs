@@ -49,8 +49,6 @@
 //! let sum = Twist::<Body>::new(1.0, 0.0, 0.0) + Twist::<World>::new(1.0, 0.0, 0.0);
 //! ```
 
-#[cfg(feature = "mint")]
-mod foreign;
 mod rotation2;
 mod rotation3;
 mod transform2;
