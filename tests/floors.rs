@@ -976,12 +976,7 @@ const METHODS_OF_CORE: [&str; 47] = [
 ];
 
 /// The circles that are left. Folder, files, reason.
-const CIRCLES: [(&str, &str, &str); 4] = [
-    (
-        "chassis",
-        "steering swerve",
-        "the layout of a swerve chassis and its steering are two files of one type",
-    ),
+const CIRCLES: [(&str, &str, &str); 3] = [
     ("motor/own", ". joint route", "an own motor is configured in `joint`: two files of one type"),
     (
         "sim",
