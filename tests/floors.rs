@@ -976,14 +976,13 @@ const METHODS_OF_CORE: [&str; 47] = [
 ];
 
 /// The circles that are left. Folder, files, reason.
-const CIRCLES: [(&str, &str, &str); 3] = [
+const CIRCLES: [(&str, &str, &str); 2] = [
     ("motor/own", ". joint route", "an own motor is configured in `joint`: two files of one type"),
     (
         "sim",
         ". chassis engine esc fault joint line motor port rotor",
         "a simulated world: its parts know each other",
     ),
-    ("sim/contract", ". edges rules", "the rules run on the bench that runs the rules"),
 ];
 
 #[test]
