@@ -976,33 +976,11 @@ const METHODS_OF_CORE: [&str; 47] = [
 ];
 
 /// The circles that are left. Folder, files, reason.
-const CIRCLES: [(&str, &str, &str); 9] = [
-    (
-        "chassis",
-        "steering swerve",
-        "the layout of a swerve chassis and its steering are two files of one type",
-    ),
-    (
-        "control/pid",
-        ". law",
-        "the parts of a step are below both laws, and a loop of errors is a `Pid` for its options",
-    ),
-    (
-        "encoder",
-        ". shaft",
-        "a shaft has a gear, and the turns of a drive are a position: `shaft` has 400 lines",
-    ),
-    ("geometry", "rotation2 rotation3", "each rotation is made from the other"),
-    ("motor/own", ". joint route", "an own motor is configured in `joint`: two files of one type"),
-    ("runner", ". port supervision", "the runner and its settings are two files of one type"),
-    ("runner/watch", ". edge", "the watch and its edges are two files of one type"),
-    (
-        "sim",
-        ". chassis engine esc fault joint line motor port rotor",
-        "a simulated world: its parts know each other",
-    ),
-    ("sim/contract", ". edges rules", "the rules run on the bench that runs the rules"),
-];
+const CIRCLES: [(&str, &str, &str); 1] = [(
+    "motor/own",
+    ". joint route",
+    "an own motor is configured in `joint`: two files of one type",
+)];
 
 #[test]
 fn the_files_of_a_folder_use_each_other_in_one_direction() {

@@ -72,8 +72,8 @@ pub use odometry::Odometry;
 pub use omni::{Differential, Omni};
 pub use power::{PowerFit, PowerModel, WheelLoad};
 pub use power_buffer::{CapacitorPlan, PowerBuffer};
-pub use steering::SwerveSteering;
-pub use swerve::{ModuleState, Swerve};
+pub use steering::{ModuleState, SwerveSteering};
+pub use swerve::Swerve;
 
 use crate::error::ConfigError;
 use crate::geometry::{Twist, World};

@@ -1,15 +1,71 @@
-use super::{ModuleState, Swerve, WheelSpeed};
-use crate::geometry::Vec2;
+use super::WheelSpeed;
+use crate::geometry::{Rotation2, Vec2};
 use crate::math::{atan2, sin_cos, wrap_pi};
 use crate::units::{Angle, AngularVelocity};
 use core::f32::consts::{FRAC_PI_2, PI};
 
+/// Motion of a steered wheel: its rolling speed, and its direction.
+///
+/// # Examples
+/// ```
+/// use drivetrain::{chassis::{ModuleState, Swerve}, geometry::Vec2, units::{Angle, AngularVelocity}};
+///
+/// let to_the_left = ModuleState::new(AngularVelocity::from_rad_per_s(10.0), Angle::from_degrees(90.0));
+/// let swerve = Swerve::new(0.1, [Vec2::new(0.3, 0.0), Vec2::new(-0.3, 0.0)])?;
+/// assert!((swerve.forward([to_the_left; 2]).vy_m_s - 1.0).abs() < 1e-5);
+/// # Ok::<(), drivetrain::error::ConfigError>(())
+/// ```
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ModuleState {
+    /// Velocity of the wheel, positive in the direction of `angle`.
+    pub velocity: AngularVelocity,
+    /// Direction of rolling, counter-clockwise from forward; any number of turns.
+    pub angle: Angle,
+}
+
+impl ModuleState {
+    /// Takes the velocity of the wheel and its direction.
+    #[must_use]
+    pub const fn new(velocity: AngularVelocity, angle: Angle) -> Self {
+        Self { velocity, angle }
+    }
+
+    pub(super) fn vector(self) -> Vec2 {
+        let velocity = Vec2::new(self.velocity.as_rad_per_s(), 0.0);
+        Rotation2::new(self.angle).apply(velocity)
+    }
+}
+
+impl WheelSpeed for ModuleState {
+    fn velocity(self) -> AngularVelocity {
+        self.velocity
+    }
+
+    fn is_finite(self) -> bool {
+        self.velocity.is_finite() && self.angle.is_finite()
+    }
+
+    fn scaled(self, factor: f32) -> Self {
+        Self { velocity: self.velocity * factor, ..self }
+    }
+
+    fn stopped(self) -> Self {
+        Self { velocity: AngularVelocity::ZERO, ..self }
+    }
+
+    fn distance(self, other: Self) -> f32 {
+        (self.vector() - other.vector()).norm()
+    }
+}
+
 /// How the modules of a swerve chassis are steered.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Steering {
-    hysteresis: Angle,
-    hold_below: AngularVelocity,
-    cosine_compensation: bool,
+    pub(super) hysteresis: Angle,
+    pub(super) hold_below: AngularVelocity,
+    pub(super) cosine_compensation: bool,
 }
 
 impl Steering {
@@ -22,51 +78,10 @@ impl Steering {
     }
 }
 
-/// How the modules are steered: a hysteresis of 5 degrees, angles held below 0.1 rad/s, cosine compensation on.
-impl<const N: usize> Swerve<N> {
-    /// Sets how far beyond 90 degrees a module must be off before its drive reverses. The sign does not matter; NaN counts as 0.
-    ///
-    /// # Examples
-    /// ```
-    /// use drivetrain::{chassis::{Swerve, SwerveSteering}, geometry::{Twist, Vec2}, units::Angle};
-    ///
-    /// let swerve = Swerve::new(0.1, [Vec2::new(0.3, 0.0), Vec2::new(-0.3, 0.0)])?
-    ///     .with_hysteresis(Angle::from_degrees(20.0));
-    /// let left = swerve.inverse(Twist::new(-0.1763, 1.0, 0.0)); // 100 degrees
-    /// let [front, _] = swerve.steer(&mut SwerveSteering::new(), left, [Some(Angle::ZERO); 2]);
-    /// assert!((front.angle.as_degrees() - 100.0).abs() < 0.3); // and not -80 with the drive reversed
-    /// # Ok::<(), drivetrain::error::ConfigError>(())
-    /// ```
-    #[must_use]
-    pub const fn with_hysteresis(mut self, hysteresis: Angle) -> Self {
-        self.steering.hysteresis = Angle::from_radians(size(hysteresis.as_radians()));
-        self
-    }
-
-    /// Sets the wheel speed below which a module stands still and keeps its angle. The sign does not matter; NaN counts as 0.
-    #[must_use]
-    pub const fn with_hold_below(mut self, speed: AngularVelocity) -> Self {
-        self.steering.hold_below = AngularVelocity::from_rad_per_s(size(speed.as_rad_per_s()));
-        self
-    }
-
-    /// Lets a module drive at full speed before it reaches its angle.
-    #[must_use]
-    pub const fn without_cosine_compensation(mut self) -> Self {
-        self.steering.cosine_compensation = false;
-        self
-    }
-}
-
-/// Without a sign; with NaN no comparison would hold, and a module at zero command would turn to 0.
-const fn size(value: f32) -> f32 {
-    if value.is_nan() { 0.0 } else { value.abs() }
-}
-
-/// Memory of the modules of a [`Swerve`] from tick to tick: the commanded angle of each.
+/// Memory of the modules of a [`Swerve`](super::Swerve) from tick to tick: the commanded angle of each.
 ///
-/// [`Chassis`](super::Chassis) keeps this memory. Without a chassis, keep it beside the layout for [`Swerve::steer`]
-/// and [`Swerve::lock`], and take a new memory when the motors were relaxed.
+/// [`Chassis`](super::Chassis) keeps this memory. Without a chassis, keep it beside the layout for
+/// [`Swerve::steer`](super::Swerve::steer) and [`Swerve::lock`](super::Swerve::lock), and take a new memory when the motors were relaxed.
 ///
 /// # Examples
 /// ```
@@ -81,11 +96,11 @@ const fn size(value: f32) -> f32 {
 /// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SwerveSteering<const N: usize>([Module; N]);
+pub struct SwerveSteering<const N: usize>(pub(super) [Module; N]);
 
 /// Memory of one module.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Module {
+pub(super) struct Module {
     target_rad: f32,
     /// Not before the module is measured: a target from nowhere would turn the module when it arms.
     has_target: bool,
@@ -106,66 +121,8 @@ impl<const N: usize> Default for SwerveSteering<N> {
     }
 }
 
-/// Turns wanted states into states that the motors of the modules can follow.
-impl<const N: usize> Swerve<N> {
-    /// Returns the target of each module, from the wanted states and the measured angles.
-    ///
-    /// * A module turns by at most 90 degrees and the hysteresis; if the opposite direction is nearer, its drive reverses.
-    ///   The hysteresis keeps a command at 90 degrees from flipping the module to and fro.
-    /// * A module away from its target angle drives with the cosine of its error, so it does not push sideways.
-    /// * At zero command a module stands still and keeps its angle, also for a wanted state that is NaN or infinite.
-    /// * The returned angles are near the measured angles, for any number of turns: no unwinding.
-    /// * A module without a measured angle stands still, because its direction of push is unknown. The module keeps its
-    ///   angle; a module never measured has no angle to keep, and gets the wanted angle, which its motor refuses.
-    ///
-    /// Costs 659 instructions on a Cortex-M4F, for four modules (`docs/figures.md`).
-    ///
-    /// # Examples
-    /// ```
-    /// use drivetrain::{chassis::{ModuleState, Swerve, SwerveSteering}, geometry::{Twist, Vec2}, units::Angle};
-    ///
-    /// let swerve = Swerve::new(0.1, [Vec2::new(0.3, 0.0), Vec2::new(-0.3, 0.0)])?;
-    /// let mut steering = SwerveSteering::new();
-    /// let back = swerve.inverse(Twist::new(-1.0, 0.1763, 0.0)); // 170 degrees
-    /// let [front, _] = swerve.steer(&mut steering, back, [Some(Angle::ZERO); 2]);
-    /// assert!((front.angle.as_degrees() + 10.0).abs() < 0.3); // 10 degrees to the right, drive reversed
-    /// assert!((front.velocity.as_rad_per_s() + 10.0).abs() < 0.01); // 10.15 rad/s times cos(10 degrees)
-    /// # Ok::<(), drivetrain::error::ConfigError>(())
-    /// ```
-    pub fn steer(
-        &self,
-        steering: &mut SwerveSteering<N>,
-        wanted: [ModuleState; N],
-        measured: [Option<Angle>; N],
-    ) -> [ModuleState; N] {
-        let config = self.steering;
-        let mut inputs = wanted.into_iter().zip(measured);
-        steering.0.each_mut().map(|module| match inputs.next() {
-            Some((wanted, measured)) => module.steer(config, wanted, measured),
-            None => ModuleState::default(),
-        })
-    }
-
-    /// Returns the states of a chassis locked in an X: all at rest, each module pointing at the origin of the body, or away
-    /// from it, whichever is nearer. The hysteresis keeps a module that lies across from turning to and fro.
-    ///
-    /// A module at the origin has no such direction, and holds its angle.
-    pub fn lock(
-        &self,
-        steering: &mut SwerveSteering<N>,
-        measured: [Option<Angle>; N],
-    ) -> [ModuleState; N] {
-        let config = self.steering;
-        let mut inputs = self.positions_m().iter().zip(measured);
-        steering.0.each_mut().map(|module| match inputs.next() {
-            Some((&position, measured)) => module.lock(config, position, measured),
-            None => ModuleState::default(),
-        })
-    }
-}
-
 impl Module {
-    fn steer(
+    pub(super) fn steer(
         &mut self,
         config: Steering,
         wanted: ModuleState,
@@ -216,7 +173,12 @@ impl Module {
         }
     }
 
-    fn lock(&mut self, config: Steering, position: Vec2, measured: Option<Angle>) -> ModuleState {
+    pub(super) fn lock(
+        &mut self,
+        config: Steering,
+        position: Vec2,
+        measured: Option<Angle>,
+    ) -> ModuleState {
         let away = Angle::from_radians(atan2(position.y, position.x));
         let Some(here) = known(measured) else {
             return self.blind(away);
@@ -245,6 +207,7 @@ const fn standing(angle: Angle) -> ModuleState {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chassis::Swerve;
     use proptest::prelude::*;
 
     fn go(degrees: f32) -> ModuleState {

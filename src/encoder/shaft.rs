@@ -1,6 +1,6 @@
 //! Turns and phase of an output shaft, and the positions written by users.
 
-use super::{COUNTS_PER_TURN, GearRatio};
+use super::gear::{COUNTS_PER_TURN, GearRatio};
 use crate::units::Angle;
 use core::f32::consts::TAU;
 use core::num::{NonZeroI16, NonZeroU16};

@@ -49,8 +49,6 @@
 //! let sum = Twist::<Body>::new(1.0, 0.0, 0.0) + Twist::<World>::new(1.0, 0.0, 0.0);
 //! ```
 
-#[cfg(feature = "mint")]
-mod foreign;
 mod rotation2;
 mod rotation3;
 mod transform2;
@@ -64,6 +62,9 @@ pub use transform2::{Pose2, Transform2};
 pub use transform3::Transform3;
 pub use twist::Twist;
 pub use vector::{Point2, Point3, Vec2, Vec3};
+
+use crate::error::ConfigError;
+use crate::math::sqrt;
 
 /// The frame of the chassis: x forward, y left, origin at the origin of the kinematics (the centre of the wheels).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -90,4 +91,12 @@ const ROUNDING: f32 = 1e-6;
 #[cfg(feature = "serde")]
 fn is_unit(square: f32) -> bool {
     (square - 1.0).abs() <= ROUNDING
+}
+
+/// Returns the factor that brings the vector of a rotation to length 1, from the square of its length.
+fn unit_scale(square: f32) -> Result<f32, ConfigError> {
+    if !(1e-12..=1e12).contains(&square) {
+        return Err(ConfigError::Unusable("quaternion"));
+    }
+    Ok(1.0 / sqrt(square))
 }

@@ -2,7 +2,7 @@
 
 use super::Vec2;
 #[cfg(feature = "serde")]
-use super::{Rotation3, is_unit};
+use super::{is_unit, unit_scale};
 #[cfg(feature = "serde")]
 use crate::error::ConfigError;
 use crate::math::{atan2, sin_cos};
@@ -211,11 +211,14 @@ impl TryFrom<StoredRotation2> for Rotation2 {
     /// Takes a vector of any length but zero.
     fn try_from(StoredRotation2 { cos, sin }: StoredRotation2) -> Result<Self, ConfigError> {
         let vector = Vec2::new(cos, sin);
-        if is_unit(vector.dot(vector)) {
+        let square = vector.dot(vector);
+        if is_unit(square) {
             return Ok(Self::from_parts(cos, sin));
         }
-        // The turn about z is a turn in space.
-        let [w, _, _, z] = Rotation3::from_quaternion(cos, 0.0, 0.0, sin)?.to_quaternion();
-        Ok(Self::from_parts(w, z))
+        if !vector.is_finite() {
+            return Err(ConfigError::NotFinite("quaternion"));
+        }
+        let scale = unit_scale(square)?;
+        Ok(Self::from_parts(cos * scale, sin * scale))
     }
 }

@@ -277,3 +277,29 @@ impl<F> Default for Point3<F> {
         Self::ORIGIN
     }
 }
+
+/// Conversions to and from the types of `mint`.
+#[cfg(feature = "mint")]
+macro_rules! conversions {
+    ($([$($frame:ident)?] $ours:ty, $theirs:ty: $($field:ident = $part:ident)+;)+) => {$(
+        impl$(<$frame>)? From<$theirs> for $ours {
+            fn from(theirs: $theirs) -> Self {
+                Self::new($(theirs.$part),+)
+            }
+        }
+
+        impl$(<$frame>)? From<$ours> for $theirs {
+            fn from(ours: $ours) -> Self {
+                Self { $($part: ours.$field),+ }
+            }
+        }
+    )+};
+}
+
+#[cfg(feature = "mint")]
+conversions! {
+    [] Vec2, mint::Vector2<f32>: x = x y = y;
+    [] Vec3, mint::Vector3<f32>: x = x y = y z = z;
+    [F] Point2<F>, mint::Point2<f32>: x_m = x y_m = y;
+    [F] Point3<F>, mint::Point3<f32>: x_m = x y_m = y z_m = z;
+}

@@ -25,21 +25,23 @@ mod port;
 #[cfg(feature = "queue")]
 mod queue;
 mod statistics;
+mod stop;
 mod supervision;
 #[cfg(test)]
 mod tests;
 mod watch;
 
-pub use port::{BlockingTx, Nb, NbAbort, Port};
+pub use port::{BlockingTx, Nb, Port};
 #[cfg(feature = "queue")]
 pub use queue::{FrameQueue, FrameReceiver, FrameSender};
 pub use statistics::Statistics;
-pub use supervision::{AbortPending, EmergencyStop};
+pub use stop::{AbortPending, EmergencyStop, NbAbort};
 pub use watch::BusCondition;
 
 use crate::frame::CanFrame;
 use crate::motor::{Devices, Ingest};
 use crate::time::{Clock, Duration, Instant, Tick, Ticker};
+use embedded_can::ErrorKind;
 use port::{Received, Sending};
 use statistics::{Meter, Tally, increment};
 use watch::{Pending, Watch, together};
@@ -163,68 +165,6 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         frames + foreign
     }
 
-    /// Takes at most `budget` frames from a queue, with the times of their arrival; drops frames of others. Returns the
-    /// number of frames.
-    #[cfg(feature = "queue")]
-    pub fn poll_queue(&mut self, queue: &mut FrameReceiver<'_>, budget: usize) -> usize {
-        self.poll_queue_with(queue, budget, |_| {})
-    }
-
-    /// Takes at most `budget` frames from a queue, with the times of their arrival, and hands frames of others to
-    /// `unrelated`. Returns the number of frames.
-    ///
-    /// Frames dropped by the queue since the last call are noted as [`lost`](Statistics::lost).
-    ///
-    /// # Examples
-    /// ```
-    /// use drivetrain::dji::{Bus, Config, M3508};
-    /// use drivetrain::frame::CanFrame;
-    /// use drivetrain::runner::{BusCondition, FrameQueue, Nb, Runner};
-    /// use drivetrain::time::{Instant, ManualClock};
-    /// # use drivetrain::sim::Simulation;
-    /// # let world = Simulation::new(1);
-    /// # let can = world.controller();
-    ///
-    /// let clock = ManualClock::new(Instant::from_micros(9));
-    /// let mut bus = Bus::new();
-    /// bus.attach(Config::<M3508>::new(1))?;
-    /// let mut runner = Runner::new(Nb(can), &clock, bus);
-    /// let mut queue = FrameQueue::<4>::new();
-    /// let (mut interrupt, mut received) = queue.split();
-    /// let frame = CanFrame::standard(0x201, [0; 8]).ok_or("not an 11-bit id")?;
-    /// for at in 1..=5 {
-    ///     interrupt.push(&frame, Instant::from_micros(at)); // there is room for three
-    /// }
-    /// assert_eq!(runner.poll_queue_with(&mut received, 16, |_| {}), 3);
-    /// assert_eq!(runner.statistics().lost, 2);
-    /// assert!(runner.has(BusCondition::ReceiveOverrun));
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    #[cfg(feature = "queue")]
-    pub fn poll_queue_with(
-        &mut self,
-        queue: &mut FrameReceiver<'_>,
-        budget: usize,
-        mut unrelated: impl FnMut(&CanFrame),
-    ) -> usize {
-        self.watch.receive_ran();
-        self.note_lost(queue.take_dropped());
-        let (mut tally, mut frames) = (Tally::default(), 0);
-        while frames < budget {
-            let Some((frame, arrived)) = queue.pop() else { break };
-            frames += 1;
-            if self.take(&frame, arrived, &mut tally) == Ingest::Unrelated {
-                unrelated(&frame);
-            }
-        }
-        self.enter(frames, &tally);
-        self.watch.standstill.receive(frames);
-        if self.pending.waits {
-            self.send_waiting();
-        }
-        frames
-    }
-
     /// Takes one frame received elsewhere, for example in an interrupt, with the time of its arrival.
     pub fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
         let mut tally = Tally::default();
@@ -325,6 +265,16 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         now
     }
 
+    #[cold]
+    #[inline(never)]
+    fn note_failure(&mut self, kind: ErrorKind) {
+        self.statistics.receive_errors.count(kind);
+        if kind == ErrorKind::Overrun {
+            let now = self.read_clock();
+            self.watch.edges.begin(BusCondition::ReceiveOverrun, now);
+        }
+    }
+
     /// Runs one step: update, then send. Drops frames of others that the driver evicts.
     ///
     /// Costs 648 instructions on a Cortex-M4F, with 8 speed loops (`docs/figures.md`).
@@ -360,6 +310,20 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         if self.watch.finish(tick.now()) {
             increment(&mut self.statistics.bus_losses);
             self.device.trip();
+        }
+    }
+
+    /// Offers the frames of the last tick that found no place: within its period, and unless something was stopped since.
+    #[cold]
+    #[inline(never)]
+    fn send_waiting(&mut self) {
+        let now = self.read_clock();
+        let is_fresh = |ticked| ticked <= now && now.since(ticked) < self.ticker.period();
+        let is_stopped = self.stop.is_some_and(EmergencyStop::is_set)
+            || self.pending.was_armed && !self.device.is_armed();
+        let has_place = self.pending.evicted.is_none();
+        if has_place && self.watch.ticked().is_some_and(is_fresh) && !is_stopped {
+            self.sending(now).send_later();
         }
     }
 

@@ -2,14 +2,13 @@
 
 use super::Statistics;
 use super::statistics::{Meter, increment};
-use super::supervision::AbortPending;
 use super::watch::{FrameKey, Pending, Watch};
 use crate::frame::CanFrame;
 use crate::motor::Devices;
 use crate::time::Instant;
 use embedded_can::{Error, ErrorKind};
 
-/// A CAN driver as the runner needs it: implemented by [`Nb`], [`NbAbort`] and [`BlockingTx`].
+/// A CAN driver as the runner needs it: implemented by [`Nb`], [`NbAbort`](super::NbAbort) and [`BlockingTx`].
 ///
 /// Several drivers implement both traits of `embedded-can`, whose methods have the same names, so the choice is a
 /// newtype. A driver with neither trait gets `embedded_can::nb::Can` by a newtype of its own.
@@ -110,77 +109,6 @@ impl<C: embedded_can::blocking::Can> Driver for BlockingTx<C> {
 
     fn try_receive(&mut self, _: &mut CanFrame) -> Received {
         Received::Empty
-    }
-}
-
-/// A driver that implements [`AbortPending`]: as [`Nb`], and no command older than one period waits in the controller.
-///
-/// Before each update, every frame not sent since the tick before is called back. Frames of the device are offered again with the
-/// values of this update. Frames of others are not offered again: they go to the closure of
-/// [`Runner::tick_with`](super::Runner::tick_with), as evicted frames do. A bus that sends nothing for 100 ms is down, as if the
-/// driver refused every frame.
-///
-/// # Examples
-/// The plug is out for 5 ms while the current changes: with `Nb`, each mailbox would send an old frame afterwards.
-/// ```
-/// use drivetrain::dji::{Bus, Config, M3508};
-/// use drivetrain::frame::CanFrame;
-/// use drivetrain::runner::{AbortPending, Nb, NbAbort, Runner};
-/// use drivetrain::time::{Duration, Instant, ManualClock};
-/// # use embedded_can::ErrorKind;
-///
-/// /// A controller whose plug is out: nothing ever leaves.
-/// #[derive(Default)]
-/// struct Unplugged(Vec<CanFrame>);
-/// # impl embedded_can::nb::Can for Unplugged {
-/// #     type Frame = CanFrame;
-/// #     type Error = ErrorKind;
-/// #     fn transmit(&mut self, frame: &CanFrame) -> nb::Result<Option<CanFrame>, ErrorKind> {
-/// #         if self.0.len() == 3 { return Err(nb::Error::WouldBlock); }
-/// #         self.0.push(*frame);
-/// #         Ok(None)
-/// #     }
-/// #     fn receive(&mut self) -> nb::Result<CanFrame, ErrorKind> { Err(nb::Error::WouldBlock) }
-/// # }
-/// impl AbortPending for Unplugged {
-///     fn abort_pending(&mut self, back: impl FnMut(CanFrame)) {
-///         self.0.drain(..).for_each(back);
-///     }
-/// }
-///
-/// let clock = ManualClock::new(Instant::START);
-/// let mut bus = Bus::new();
-/// bus.attach(Config::<M3508>::new(1))?;
-/// let mut runner = Runner::new(NbAbort(Nb(Unplugged::default())), &clock, bus);
-/// for _ in 0..5 {
-///     clock.advance(Duration::from_millis(1));
-///     runner.poll(16);
-///     if let Some(tick) = runner.due() {
-///         runner.tick(tick);
-///     }
-/// }
-/// assert_eq!(runner.port_mut().0.0.0.len(), 1); // that of the last tick
-/// assert_eq!(runner.statistics().evicted, 4);
-/// # Ok::<(), drivetrain::dji::AttachError>(())
-/// ```
-#[derive(Debug, Clone, Copy)]
-pub struct NbAbort<C>(pub Nb<C>);
-
-impl<C: AbortPending> Port for NbAbort<C> {}
-
-impl<C: AbortPending> Driver for NbAbort<C> {
-    #[inline(always)]
-    fn try_send(&mut self, frame: &CanFrame, evicted: &mut CanFrame) -> Sent {
-        self.0.try_send(frame, evicted)
-    }
-
-    #[inline]
-    fn try_receive(&mut self, frame: &mut CanFrame) -> Received {
-        self.0.try_receive(frame)
-    }
-
-    fn call_back(&mut self, mut back: impl FnMut(Option<CanFrame>)) {
-        self.0.0.abort_pending(|frame| back(CanFrame::copy_of(&frame)));
     }
 }
 

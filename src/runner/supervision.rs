@@ -1,10 +1,12 @@
-//! Supervision of a runner: its settings, arming, the counters and conditions, the emergency stop, and the abort of pending frames.
+//! The methods of a runner beside its cycle: settings, arming, frames of a queue, counters and conditions.
 
-use super::{BusCondition, Port, Runner, Statistics};
+use super::{BusCondition, EmergencyStop, Port, Runner, Statistics};
+#[cfg(feature = "queue")]
+use super::{FrameReceiver, statistics::Tally};
 use crate::motor::{ArmError, BusLoad, Devices, ask};
 use crate::time::{Clock, Duration, Edge, Tick, Ticker};
-use core::sync::atomic::{AtomicBool, Ordering};
-use embedded_can::ErrorKind;
+#[cfg(feature = "queue")]
+use crate::{frame::CanFrame, motor::Ingest};
 
 impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// Sets another period than 1 ms.
@@ -93,30 +95,66 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         self.device.clear_emergency_stop();
     }
 
-    /// Returns the counters.
-    #[must_use]
-    pub fn statistics(&mut self) -> Statistics {
-        Statistics {
-            superseded: self.device.superseded(),
-            overruns: self.statistics.overruns.saturating_add(self.ticker.overruns()),
-            clock_standstills: self.watch.standstills,
-            clock_reversals: self.watch.reversals,
-            ..self.statistics.with_sums()
-        }
+    /// Takes at most `budget` frames from a queue, with the times of their arrival; drops frames of others. Returns the
+    /// number of frames.
+    #[cfg(feature = "queue")]
+    pub fn poll_queue(&mut self, queue: &mut FrameReceiver<'_>, budget: usize) -> usize {
+        self.poll_queue_with(queue, budget, |_| {})
     }
 
-    /// Offers the frames of the last tick that found no place: within its period, and unless something was stopped since.
-    #[cold]
-    #[inline(never)]
-    pub(super) fn send_waiting(&mut self) {
-        let now = self.read_clock();
-        let is_fresh = |ticked| ticked <= now && now.since(ticked) < self.ticker.period();
-        let is_stopped = self.stop.is_some_and(EmergencyStop::is_set)
-            || self.pending.was_armed && !self.device.is_armed();
-        let has_place = self.pending.evicted.is_none();
-        if has_place && self.watch.ticked().is_some_and(is_fresh) && !is_stopped {
-            self.sending(now).send_later();
+    /// Takes at most `budget` frames from a queue, with the times of their arrival, and hands frames of others to
+    /// `unrelated`. Returns the number of frames.
+    ///
+    /// Frames dropped by the queue since the last call are noted as [`lost`](Statistics::lost).
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::dji::{Bus, Config, M3508};
+    /// use drivetrain::frame::CanFrame;
+    /// use drivetrain::runner::{BusCondition, FrameQueue, Nb, Runner};
+    /// use drivetrain::time::{Instant, ManualClock};
+    /// # use drivetrain::sim::Simulation;
+    /// # let world = Simulation::new(1);
+    /// # let can = world.controller();
+    ///
+    /// let clock = ManualClock::new(Instant::from_micros(9));
+    /// let mut bus = Bus::new();
+    /// bus.attach(Config::<M3508>::new(1))?;
+    /// let mut runner = Runner::new(Nb(can), &clock, bus);
+    /// let mut queue = FrameQueue::<4>::new();
+    /// let (mut interrupt, mut received) = queue.split();
+    /// let frame = CanFrame::standard(0x201, [0; 8]).ok_or("not an 11-bit id")?;
+    /// for at in 1..=5 {
+    ///     interrupt.push(&frame, Instant::from_micros(at)); // there is room for three
+    /// }
+    /// assert_eq!(runner.poll_queue_with(&mut received, 16, |_| {}), 3);
+    /// assert_eq!(runner.statistics().lost, 2);
+    /// assert!(runner.has(BusCondition::ReceiveOverrun));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[cfg(feature = "queue")]
+    pub fn poll_queue_with(
+        &mut self,
+        queue: &mut FrameReceiver<'_>,
+        budget: usize,
+        mut unrelated: impl FnMut(&CanFrame),
+    ) -> usize {
+        self.watch.receive_ran();
+        self.note_lost(queue.take_dropped());
+        let (mut tally, mut frames) = (Tally::default(), 0);
+        while frames < budget {
+            let Some((frame, arrived)) = queue.pop() else { break };
+            frames += 1;
+            if self.take(&frame, arrived, &mut tally) == Ingest::Unrelated {
+                unrelated(&frame);
+            }
         }
+        self.enter(frames, &tally);
+        self.watch.standstill.receive(frames);
+        if self.pending.waits {
+            self.send_waiting();
+        }
+        frames
     }
 
     /// Counts received frames lost before this call, for example in a queue of the application. 0 changes nothing.
@@ -128,13 +166,15 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         }
     }
 
-    #[cold]
-    #[inline(never)]
-    pub(super) fn note_failure(&mut self, kind: ErrorKind) {
-        self.statistics.receive_errors.count(kind);
-        if kind == ErrorKind::Overrun {
-            let now = self.read_clock();
-            self.watch.edges.begin(BusCondition::ReceiveOverrun, now);
+    /// Returns the counters.
+    #[must_use]
+    pub fn statistics(&mut self) -> Statistics {
+        Statistics {
+            superseded: self.device.superseded(),
+            overruns: self.statistics.overruns.saturating_add(self.ticker.overruns()),
+            clock_standstills: self.watch.standstills,
+            clock_reversals: self.watch.reversals,
+            ..self.statistics.with_sums()
         }
     }
 
@@ -267,58 +307,5 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     #[must_use]
     pub const fn heartbeat(&self) -> u32 {
         self.watch.heartbeat
-    }
-}
-
-/// A CAN driver that can abort frames pending in its controller, as bxCAN, FDCAN and MCP2515 allow.
-///
-/// `embedded-can` has no such call. Without it, if the plug is pulled while the motors are driven, a frame with the old
-/// currents stays in each mailbox and leaves when the bus is back. Implement the trait for the newtype around the driver, and
-/// give the runner `NbAbort(Nb(driver))`.
-pub trait AbortPending: embedded_can::nb::Can {
-    /// Aborts the transmission of all pending frames, and hands each aborted frame to `back`. Does not wait.
-    ///
-    /// A frame on the wire at that moment may still arrive; if the controller cannot tell, the frame is handed over too.
-    /// Frames in a queue of the driver count as pending as well.
-    fn abort_pending(&mut self, back: impl FnMut(Self::Frame));
-}
-
-/// An emergency stop that any context can set: put it into a `static` and set it from an interrupt.
-///
-/// The runner reads the stop in each tick; from that tick on every command is zero, until
-/// [`Runner::clear_emergency_stop`](super::Runner::clear_emergency_stop) and arming again.
-///
-/// # Examples
-/// ```
-/// use drivetrain::runner::EmergencyStop;
-///
-/// static STOP: EmergencyStop = EmergencyStop::new();
-/// STOP.set(); // from an interrupt
-/// assert!(STOP.is_set());
-/// ```
-#[derive(Debug, Default)]
-pub struct EmergencyStop(AtomicBool);
-
-impl EmergencyStop {
-    /// Makes an emergency stop that is not set.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self(AtomicBool::new(false))
-    }
-
-    /// Stops.
-    pub fn set(&self) {
-        self.0.store(true, Ordering::Release);
-    }
-
-    /// Clears the stop; stopped motors stay stopped until [`Runner::clear_emergency_stop`](super::Runner::clear_emergency_stop).
-    pub fn clear(&self) {
-        self.0.store(false, Ordering::Release);
-    }
-
-    /// Returns whether the stop is set.
-    #[must_use]
-    pub fn is_set(&self) -> bool {
-        self.0.load(Ordering::Acquire)
     }
 }

@@ -6,6 +6,7 @@ pub use edge::BusCondition;
 pub(super) use edge::FrameKey;
 
 use crate::frame::CanFrame;
+use crate::motor::take_age;
 use crate::time::{Duration, Instant, Tick};
 use edge::{BusEdge, Edges, Unsent, WATCHED_FRAMES};
 
@@ -22,6 +23,10 @@ pub(super) fn together(waiting: Tick, next: Tick) -> Tick {
 
 /// Time without feedback, or with an unsent command frame, after which the bus counts as faulty.
 const BUS_LOST_AFTER: Duration = Duration::from_millis(100);
+
+/// A frame that the device no longer offers is forgotten: after this time, or after this number of ticks, in which each of many
+/// devices has its turn. A frame sent seldom, such as the limits of a drive, may be refused once.
+const FORGOTTEN_AFTER: (Duration, u8) = (Duration::from_secs(1), 32);
 
 #[derive(Debug)]
 pub(super) struct Watch {
@@ -137,6 +142,97 @@ impl Watch {
                 self.edges.begin(BusCondition::Silent, now);
             }
         }
+    }
+
+    fn accept_unsent(&mut self, header: u32, now: Instant) {
+        for place in &mut self.unsent {
+            let Some(unsent) = place.as_mut().filter(|unsent| unsent.key.fits(header)) else {
+                continue;
+            };
+            if unsent.stays_sent(now) {
+                *place = None;
+            } else {
+                (unsent.offered, unsent.is_accepted) = (now.stamp(), true);
+                (unsent.tries, unsent.idle) = (0, 0);
+            }
+        }
+    }
+
+    /// Notes a frame not taken by the driver; returns the number of refusals in a row.
+    pub(super) fn refused(&mut self, key: FrameKey, now: Instant) -> u8 {
+        let Some(unsent) = self.unsent_of(key) else {
+            self.begin_unsent(key, now);
+            return 1;
+        };
+        if core::mem::take(&mut unsent.is_accepted) {
+            // The frame of an earlier tick was taken and stayed.
+            (unsent.since, unsent.returns) = (now.stamp(), false);
+        }
+        (unsent.offered, unsent.idle) = (now.stamp(), 0);
+        unsent.tries = unsent.tries.saturating_add(1);
+        unsent.tries
+    }
+
+    /// Notes a frame that the driver had taken and gave back.
+    pub(super) fn evicted(&mut self, key: FrameKey, now: Instant) {
+        match self.unsent_of(key) {
+            Some(unsent) => {
+                (unsent.is_accepted, unsent.offered, unsent.idle) = (false, now.stamp(), 0);
+            }
+            None => self.begin_unsent(key, now),
+        }
+    }
+
+    /// Notes a frame called back after a whole tick in the controller.
+    #[cold]
+    pub(super) fn called_back(&mut self, key: FrameKey, now: Instant) {
+        self.evicted(key, now);
+        if let Some(unsent) = self.unsent_of(key) {
+            unsent.returns = true;
+        }
+    }
+
+    #[inline(never)]
+    fn unsent_of(&mut self, key: FrameKey) -> Option<&mut Unsent> {
+        self.unsent.iter_mut().flatten().find(|unsent| unsent.key == key)
+    }
+
+    fn begin_unsent(&mut self, key: FrameKey, now: Instant) {
+        if let Some(place) = self.unsent.iter_mut().find(|unsent| unsent.is_none()) {
+            *place = Some(Unsent {
+                key,
+                since: now.stamp(),
+                offered: now.stamp(),
+                is_accepted: false,
+                returns: false,
+                tries: 1,
+                idle: 0,
+            });
+            self.has_unsent = true;
+        }
+    }
+
+    fn watch_sending(&mut self, now: Instant) -> bool {
+        let mut lost = false;
+        for place in &mut self.unsent {
+            let Some(unsent) = place else { continue };
+            let stays_sent = unsent.stays_sent(now);
+            let waits = take_age(now, &mut unsent.since);
+            let is_forgotten = take_age(now, &mut unsent.offered) >= FORGOTTEN_AFTER.0
+                || unsent.idle >= FORGOTTEN_AFTER.1;
+            unsent.idle = unsent.idle.saturating_add(1);
+            if stays_sent || is_forgotten {
+                *place = None;
+            } else if !unsent.is_accepted || unsent.returns {
+                lost |= waits >= BUS_LOST_AFTER;
+            }
+        }
+        self.has_unsent = self.unsent.iter().any(Option::is_some);
+        if lost {
+            return self.edges.begin(BusCondition::Down, now);
+        }
+        self.edges.end(BusCondition::Down, now);
+        false
     }
 
     pub(super) const fn has(&self, condition: BusCondition) -> bool {
@@ -431,6 +527,36 @@ mod tests {
         let edge = runner.next_edge().unwrap();
         assert_eq!((edge.condition, edge.began), (BusCondition::ClockStandstill, true));
         assert_eq!(runner.heartbeat(), 0);
+    }
+
+    fn exactly(header: u32) -> FrameKey {
+        let frame = CanFrame::standard(u16::try_from(header).unwrap(), [0; 8]).unwrap();
+        FrameKey::of(&mut Bus::new(), &frame)
+    }
+
+    /// A drive's limits, each 101 ms, refused each time: the frames of the other devices pass.
+    #[test]
+    fn a_frame_that_is_sent_seldom_and_refused_each_time_is_no_lost_bus() {
+        let mut watch = Watch::new();
+        for ms in 1..1_000 {
+            let now = Instant::from_micros(1_000 * ms);
+            if ms % 101 == 1 {
+                watch.refused(exactly(0x0C5), now);
+            }
+            assert!(!watch.finish(now), "{ms} ms");
+        }
+    }
+
+    /// Thirty devices take turns, and the driver takes no frame: each frame is offered in each thirtieth tick.
+    #[test]
+    fn turns_of_many_devices_do_not_hide_a_lost_bus() {
+        let mut watch = Watch::new();
+        let lost = (1..300_u32).find(|ms| {
+            let now = Instant::from_micros(1_000 * u64::from(*ms));
+            watch.refused(exactly(0x100 + ms % 30), now);
+            watch.finish(now)
+        });
+        assert!(lost.is_some_and(|ms| (100..150).contains(&ms)), "{lost:?}");
     }
 }
 

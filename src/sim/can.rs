@@ -1,6 +1,19 @@
 use crate::frame::CanFrame;
 use embedded_can::{Frame, Id};
 
+/// One of the three buses of a [`Simulation`](super::Simulation).
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Line {
+    /// The first bus.
+    #[default]
+    Can1,
+    /// The second bus.
+    Can2,
+    /// The third bus.
+    Can3,
+}
+
 /// The pause after a frame, in bits: no node may begin another frame in it.
 pub const INTERMISSION_BITS: u32 = 3;
 

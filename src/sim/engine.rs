@@ -3,10 +3,9 @@ use super::chassis::{Chassis, Escs};
 use super::esc::Esc;
 use super::fault::Faults;
 use super::joint::Drive;
-use super::line::{Line, Sender, Transmission, Wire};
+use super::line::{Ring, Sender, Transmission, Wire};
 use super::motor::{JOINTS, MOTORS, MotorConfig, MotorState};
-use super::port::Ring;
-use super::{Fault, JointConfig, MotorKey, SimError};
+use super::{Fault, JointConfig, Line, MotorKey, SimError};
 use crate::frame::CanFrame;
 use embedded_can::Frame;
 

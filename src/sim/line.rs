@@ -1,21 +1,7 @@
-use super::can::{INTERMISSION_BITS, Mailboxes, frame_bits};
-use super::port::Ring;
+use super::can::{INTERMISSION_BITS, Line, Mailboxes, frame_bits};
 use crate::frame::CanFrame;
 use crate::time::Instant;
 use embedded_can::{Frame, Id};
-
-/// One of the three buses of a [`Simulation`](super::Simulation).
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Line {
-    /// The first bus.
-    #[default]
-    Can1,
-    /// The second bus.
-    Can2,
-    /// The third bus.
-    Can3,
-}
 
 /// Sender of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -302,5 +288,49 @@ impl Wire {
     /// Takes a frame received by the controller.
     pub(crate) fn take_heard(&mut self) -> Option<CanFrame> {
         self.receive.pop()
+    }
+}
+
+/// A queue of at most `N` values, first in, first out.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Ring<T, const N: usize> {
+    slots: [Option<T>; N],
+    first: usize,
+    length: usize,
+}
+
+impl<T: Copy, const N: usize> Ring<T, N> {
+    pub(crate) const fn new() -> Self {
+        Self { slots: [None; N], first: 0, length: 0 }
+    }
+
+    pub(crate) const fn len(&self) -> usize {
+        self.length
+    }
+
+    /// Appends a value; returns it when the queue is full.
+    pub(crate) fn push(&mut self, value: T) -> Result<(), T> {
+        if self.length >= N {
+            return Err(value);
+        }
+        match self.slots.get_mut((self.first + self.length) % N) {
+            Some(slot) => *slot = Some(value),
+            None => return Err(value),
+        }
+        self.length += 1;
+        Ok(())
+    }
+
+    /// Returns the first value without removing it.
+    pub(crate) fn peek(&self) -> Option<T> {
+        self.slots.get(self.first).copied().flatten()
+    }
+
+    /// Takes out the first value.
+    pub(crate) fn pop(&mut self) -> Option<T> {
+        let value = self.slots.get_mut(self.first)?.take()?;
+        self.first = (self.first + 1) % N;
+        self.length -= 1;
+        Some(value)
     }
 }

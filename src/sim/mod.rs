@@ -94,14 +94,14 @@ use core::ops::RangeBounds;
 use engine::Engine;
 use motor::{JOINTS, MOTORS};
 
-pub use can::{INTERMISSION_BITS, frame_bits, nominal_bits, worst_case_bits};
+pub use can::{INTERMISSION_BITS, Line, frame_bits, nominal_bits, worst_case_bits};
 pub use chassis::{ChassisConfig, ChassisState, Wheel};
 pub use drive::{
     DamiaoDrive, Drive, DriveShaft, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive,
 };
 pub use fault::{Fault, SimError};
 pub use joint::JointConfig;
-pub use line::{Line, Sender, Traffic, Transmission};
+pub use line::{Sender, Traffic, Transmission};
 pub use motor::{MotorConfig, MotorKey, MotorState};
 pub use port::{Controller, SerialLine};
 
@@ -185,7 +185,7 @@ impl Simulation {
     /// Returns the driver's end of a bus. Each call gives the same end.
     #[must_use]
     pub const fn controller_on(&self, line: Line) -> Controller<'_> {
-        Controller::new(self, line)
+        Controller::new(&self.0, line)
     }
 
     /// Returns a clock that shows the time of this world: a reference to it.

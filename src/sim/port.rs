@@ -1,8 +1,11 @@
 use super::can::Offer;
+use super::engine::Engine;
 use super::esc::Random;
-use super::{Fault, Line, SimError, Simulation};
+use super::line::Ring;
+use super::{Fault, Line, SimError};
 use crate::frame::CanFrame;
 use crate::time::Instant;
+use core::cell::RefCell;
 
 /// Time limit of a blocking call, in simulated time.
 const PATIENCE_NS: u64 = 1_000_000_000;
@@ -41,25 +44,25 @@ const NAP_NS: u64 = 100_000;
 /// ```
 #[derive(Debug)]
 pub struct Controller<'a> {
-    world: &'a Simulation,
+    engine: &'a RefCell<Engine>,
     line: Line,
 }
 
 impl<'a> Controller<'a> {
-    pub(super) const fn new(world: &'a Simulation, line: Line) -> Self {
-        Self { world, line }
+    pub(super) const fn new(engine: &'a RefCell<Engine>, line: Line) -> Self {
+        Self { engine, line }
     }
 
     /// Aborts the frames in the mailboxes, except a frame in transmission.
     ///
     /// embedded-can has no such call; drivers name it `abort`.
     pub fn abort_pending(&mut self) {
-        self.world.with(|engine| engine.wire_mut(self.line).mailboxes.abort());
+        self.with(|engine| engine.wire_mut(self.line).mailboxes.abort());
     }
 
     /// Fails where any call of the driver fails.
     fn check(&self) -> Result<(), SimError> {
-        self.world.with(|engine| {
+        self.with(|engine| {
             let now_ns = engine.now_ns;
             let error = if engine.faults.is_active(Fault::BusOff(self.line), now_ns) {
                 SimError::BusOff
@@ -76,12 +79,12 @@ impl<'a> Controller<'a> {
 
     fn is_blocked(&self) -> bool {
         let blocked = Fault::WouldBlock(self.line);
-        self.world.with(|engine| engine.faults.is_active(blocked, engine.now_ns))
+        self.with(|engine| engine.faults.is_active(blocked, engine.now_ns))
     }
 
     fn offer(&self, frame: &CanFrame) -> Offer {
         let blocked = self.is_blocked();
-        self.world.with(|engine| {
+        self.with(|engine| {
             let wire = engine.wire_mut(self.line);
             let offer = if blocked { Offer::Refused } else { wire.mailboxes.offer(*frame) };
             match offer {
@@ -94,12 +97,17 @@ impl<'a> Controller<'a> {
     }
 
     fn take(&self) -> nb::Result<CanFrame, SimError> {
-        let missed = self.world.with(|engine| engine.wire_mut(self.line).take_overrun());
+        let missed = self.with(|engine| engine.wire_mut(self.line).take_overrun());
         if missed {
             return Err(nb::Error::Other(SimError::Overrun));
         }
-        let heard = self.world.with(|engine| engine.wire_mut(self.line).take_heard());
+        let heard = self.with(|engine| engine.wire_mut(self.line).take_heard());
         heard.ok_or(nb::Error::WouldBlock)
+    }
+
+    /// Works on the world. No caller's code runs in `work`, so the world is never borrowed twice.
+    fn with<T>(&self, work: impl FnOnce(&mut Engine) -> T) -> T {
+        work(&mut self.engine.borrow_mut())
     }
 
     /// Moves time until `attempt` gives something.
@@ -107,12 +115,12 @@ impl<'a> Controller<'a> {
         &self,
         mut attempt: impl FnMut() -> Option<Result<T, SimError>>,
     ) -> Result<T, SimError> {
-        let deadline_ns = self.world.with(|engine| engine.now_ns.saturating_add(PATIENCE_NS));
+        let deadline_ns = self.with(|engine| engine.now_ns.saturating_add(PATIENCE_NS));
         loop {
             if let Some(result) = attempt() {
                 return result;
             }
-            let waiting = self.world.with(|engine| {
+            let waiting = self.with(|engine| {
                 let limit_ns = engine.now_ns.saturating_add(NAP_NS);
                 if let Some(record) = engine.run_until(limit_ns) {
                     let _full = engine.unseen.push(record);
@@ -155,7 +163,7 @@ impl embedded_can::blocking::Can for Controller<'_> {
                 return Some(Err(error));
             }
             let line = self.line;
-            let room = self.world.with(|engine| engine.wire(line).mailboxes.has_room());
+            let room = self.with(|engine| engine.wire(line).mailboxes.has_room());
             // Room first: a blocking driver waits and does not evict.
             (room && !self.is_blocked()).then(|| {
                 self.offer(frame);
@@ -333,54 +341,10 @@ impl SerialLine {
     }
 }
 
-/// A queue of at most `N` values, first in, first out.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Ring<T, const N: usize> {
-    slots: [Option<T>; N],
-    first: usize,
-    length: usize,
-}
-
-impl<T: Copy, const N: usize> Ring<T, N> {
-    pub(crate) const fn new() -> Self {
-        Self { slots: [None; N], first: 0, length: 0 }
-    }
-
-    pub(crate) const fn len(&self) -> usize {
-        self.length
-    }
-
-    /// Appends a value; returns it when the queue is full.
-    pub(crate) fn push(&mut self, value: T) -> Result<(), T> {
-        if self.length >= N {
-            return Err(value);
-        }
-        match self.slots.get_mut((self.first + self.length) % N) {
-            Some(slot) => *slot = Some(value),
-            None => return Err(value),
-        }
-        self.length += 1;
-        Ok(())
-    }
-
-    /// Returns the first value without removing it.
-    pub(crate) fn peek(&self) -> Option<T> {
-        self.slots.get(self.first).copied().flatten()
-    }
-
-    /// Takes out the first value.
-    pub(crate) fn pop(&mut self) -> Option<T> {
-        let value = self.slots.get_mut(self.first)?.take()?;
-        self.first = (self.first + 1) % N;
-        self.length -= 1;
-        Some(value)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::{Sender, Transmission};
+    use crate::sim::{Sender, Simulation, Transmission};
     use crate::time::{Duration, Instant};
     use embedded_can::Frame as _;
     use embedded_can::nb::Can as _;

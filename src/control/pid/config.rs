@@ -6,6 +6,10 @@ use crate::error::{
 pub(super) const NOT_PLAIN: u16 = 1;
 pub(super) const DERIVATIVE_ON_ERROR: u16 = 1 << 1;
 pub(super) const INCREMENTAL: u16 = 1 << 2;
+/// Set by a refused sample until the next good step, beside the options: the travel of the measurement in that time is unknown.
+pub(super) const REST_DERIVATIVE: u16 = 1 << 3;
+/// Set by `reset_to` until the next step, beside the options.
+pub(super) const TRACK_OUTPUT: u16 = 1 << 4;
 
 /// The numbers of a [`PidConfig`] stored by a controller as they are.
 #[derive(Debug, Clone, Copy, PartialEq)]

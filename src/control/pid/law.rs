@@ -8,44 +8,13 @@
 //!       └─ bound        limits, first calls, long steps, overflow
 //! ```
 
-use super::Pid;
-use super::config::{DERIVATIVE_ON_ERROR, INCREMENTAL, NOT_PLAIN, Parameters};
+use super::config::{DERIVATIVE_ON_ERROR, REST_DERIVATIVE, TRACK_OUTPUT};
+use super::{ErrorPid, Pid, UNKNOWN, limit_of};
 use crate::control::number::{finite, limited};
 use crate::math;
 use crate::time::TimeStep;
 
-/// A controller whose error is formed elsewhere: the part of a [`Pid`] that knows neither setpoint nor measurement.
-///
-/// Options of the setpoint (feed-forward, period, tracking, derivative of the error) do not apply and need no storage.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-// What each step stores stands first, and what it reads next to it.
-#[repr(C)]
-pub(crate) struct ErrorPid {
-    pub(super) error: f32,
-    pub(super) rate: f32,
-    pub(super) output: f32,
-    pub(super) integral: f32,
-    /// Of the integral; closed unless the controller is plain.
-    pub(super) integral_gate: u32,
-    /// Of the output; equal to the gate of the integral unless the controller is plain.
-    pub(super) output_gate: u32,
-    pub(super) parameters: Parameters,
-    pub(super) options: u16,
-    pub(super) rejected: u16,
-}
-
-const _: () = assert!(size_of::<ErrorPid>() <= 72, "one for each motor of a bus");
-
 impl ErrorPid {
-    /// Makes a change, or a step with a given error, as the whole controller does.
-    pub(crate) fn as_pid<T>(&mut self, change: impl FnOnce(&mut Pid) -> T) -> T {
-        let mut whole = Pid::of_error(*self);
-        let done = change(&mut whole);
-        *self = whole.core;
-        done
-    }
-
     /// The plain law: gains, integral limit, one output limit.
     ///
     /// # Errors
@@ -146,39 +115,6 @@ impl ErrorPid {
         self.rate = rate;
         self.integral = integral;
         output
-    }
-
-    /// Tells whether the memory may hold a value.
-    pub(super) const fn has_memory(&self) -> bool {
-        self.parameters.ki > 0.0 || self.options & INCREMENTAL != 0
-    }
-
-    /// Tells whether the plain law knows all options that are on: gains, integral limit, one output limit.
-    pub(crate) const fn is_plain(&self) -> bool {
-        self.options & NOT_PLAIN == 0
-    }
-
-    /// Tells whether the output has limits.
-    pub(crate) const fn is_limited(&self) -> bool {
-        self.parameters.output_upper < f32::MAX
-    }
-
-    /// Returns what the output limits leave of `value`.
-    pub(in crate::control) const fn within_output_range(&self, value: f32) -> f32 {
-        limited(value, self.parameters.output_lower, self.parameters.output_upper)
-    }
-
-    pub(super) const fn integral_limit_gate(&self) -> u32 {
-        if self.integral_gate != CLOSED { self.integral_gate } else { self.output_gate }
-    }
-
-    /// Opens the plain law, or closes it.
-    pub(super) const fn set_options(&mut self, options: u16) {
-        let limit = self.integral_limit_gate();
-        let is_plain = options & (NOT_PLAIN | REST_DERIVATIVE) == 0;
-        self.integral_gate = if is_plain { limit } else { CLOSED };
-        self.output_gate = if is_plain { gate(self.parameters.output_upper) } else { limit };
-        self.options = options;
     }
 }
 
@@ -309,27 +245,7 @@ impl Pid {
 /// The output; or whether the error is known to be finite.
 pub(crate) type Plain = Result<f32, bool>;
 
-/// Set by a refused sample until the next good step, beside the options: the travel of the measurement in that time is unknown.
-pub(super) const REST_DERIVATIVE: u16 = 1 << 3;
-/// Set by `reset_to` until the next step, beside the options.
-pub(super) const TRACK_OUTPUT: u16 = 1 << 4;
-
-/// Marks a stored error or measurement as unknown: arithmetic with it never passes a [`gate`].
-pub(super) const UNKNOWN: f32 = f32::INFINITY;
-
-/// A gate passed by no value.
-pub(super) const CLOSED: u32 = 0;
-
-/// Encodes a limit for one integer comparison: the value is within ±`limit`, and neither NaN nor infinite.
-pub(super) const fn gate(limit: f32) -> u32 {
-    (limit.to_bits() << 1) + 1
-}
-
-/// Returns the limit encoded by a gate.
-pub(super) const fn limit_of(gate: u32) -> f32 {
-    f32::from_bits(gate >> 1)
-}
-
+/// Tells whether a value is within the limit of a [`gate`](super::gate): one integer comparison.
 const fn passes(value: f32, gate: u32) -> bool {
     value.to_bits() << 1 < gate
 }

@@ -4,12 +4,12 @@ mod config;
 mod law;
 
 pub use config::PidConfig;
-pub(crate) use law::ErrorPid;
 
 use crate::control::number::{finite, friction, limited};
 use crate::error::{ConfigError, check};
-use config::{DERIVATIVE_ON_ERROR, INCREMENTAL};
-use law::{CLOSED, REST_DERIVATIVE, TRACK_OUTPUT, UNKNOWN, gate, limit_of};
+use config::{
+    DERIVATIVE_ON_ERROR, INCREMENTAL, NOT_PLAIN, Parameters, REST_DERIVATIVE, TRACK_OUTPUT,
+};
 
 /// A PID controller, positional or incremental, with the options of its [`PidConfig`].
 ///
@@ -303,6 +303,88 @@ impl Pid {
         let state = self.core.options & (REST_DERIVATIVE | TRACK_OUTPUT);
         self.core.set_options(config.options() | state);
     }
+}
+
+/// A controller whose error is formed elsewhere: the part of a [`Pid`] that knows neither setpoint nor measurement.
+///
+/// Options of the setpoint (feed-forward, period, tracking, derivative of the error) do not apply and need no storage.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+// What each step stores stands first, and what it reads next to it.
+#[repr(C)]
+pub(crate) struct ErrorPid {
+    error: f32,
+    rate: f32,
+    output: f32,
+    integral: f32,
+    /// Of the integral; closed unless the controller is plain.
+    integral_gate: u32,
+    /// Of the output; equal to the gate of the integral unless the controller is plain.
+    output_gate: u32,
+    parameters: Parameters,
+    options: u16,
+    rejected: u16,
+}
+
+const _: () = assert!(size_of::<ErrorPid>() <= 72, "one for each motor of a bus");
+
+impl ErrorPid {
+    /// Makes a change, or a step with a given error, as the whole controller does.
+    pub(crate) fn as_pid<T>(&mut self, change: impl FnOnce(&mut Pid) -> T) -> T {
+        let mut whole = Pid::of_error(*self);
+        let done = change(&mut whole);
+        *self = whole.core;
+        done
+    }
+
+    /// Tells whether the memory may hold a value.
+    const fn has_memory(&self) -> bool {
+        self.parameters.ki > 0.0 || self.options & INCREMENTAL != 0
+    }
+
+    /// Tells whether the plain law knows all options that are on: gains, integral limit, one output limit.
+    pub(crate) const fn is_plain(&self) -> bool {
+        self.options & NOT_PLAIN == 0
+    }
+
+    /// Tells whether the output has limits.
+    pub(crate) const fn is_limited(&self) -> bool {
+        self.parameters.output_upper < f32::MAX
+    }
+
+    /// Returns what the output limits leave of `value`.
+    pub(in crate::control) const fn within_output_range(&self, value: f32) -> f32 {
+        limited(value, self.parameters.output_lower, self.parameters.output_upper)
+    }
+
+    const fn integral_limit_gate(&self) -> u32 {
+        if self.integral_gate != CLOSED { self.integral_gate } else { self.output_gate }
+    }
+
+    /// Opens the plain law, or closes it.
+    const fn set_options(&mut self, options: u16) {
+        let limit = self.integral_limit_gate();
+        let is_plain = options & (NOT_PLAIN | REST_DERIVATIVE) == 0;
+        self.integral_gate = if is_plain { limit } else { CLOSED };
+        self.output_gate = if is_plain { gate(self.parameters.output_upper) } else { limit };
+        self.options = options;
+    }
+}
+
+/// Marks a stored error or measurement as unknown: arithmetic with it never passes a [`gate`].
+const UNKNOWN: f32 = f32::INFINITY;
+
+/// A gate passed by no value.
+const CLOSED: u32 = 0;
+
+/// Encodes a limit for one integer comparison: the value is within ±`limit`, and neither NaN nor infinite.
+const fn gate(limit: f32) -> u32 {
+    (limit.to_bits() << 1) + 1
+}
+
+/// Returns the limit encoded by a gate.
+const fn limit_of(gate: u32) -> f32 {
+    f32::from_bits(gate >> 1)
 }
 
 #[cfg(test)]

@@ -1,6 +1,5 @@
 //! The runner against a scripted driver: any answer at any time.
 
-mod abort;
 mod places;
 
 use super::*;

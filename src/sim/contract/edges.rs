@@ -1,4 +1,4 @@
-//! Rules about the edges of the motors of a device.
+//! Rules about the edges of the motors of a device, and about arming after a trip or during a fault.
 
 use super::{Outcome, Rule, Run, Subject};
 use crate::motor::{ArmError, Claim, Condition, Conditions, Devices, Ingest, MotorName, Role};
@@ -238,4 +238,49 @@ pub(super) fn second_master<S: Subject>(make: &impl Fn() -> S) -> Outcome {
         run.expect(refused && !armed, rule)?;
     }
     Ok(())
+}
+
+/// Updates that do not lie after the one before: zero in that cycle, and until the device is armed by a new request.
+pub(super) fn lost_time<S: Subject>(make: &impl Fn() -> S) -> Outcome {
+    for back_ms in [0, 1, 5, 100, 350] {
+        let mut run = Run::driving(make())?;
+        run.step()?;
+        run.ms = run.ms.saturating_sub(back_ms).max(1);
+        for round in 0..50 {
+            _ = run.subject.drive(1.0);
+            let output = if round == 0 { run.update(0.001)? } else { run.step()? };
+            let armed = run.subject.device().is_armed();
+            run.expect(output.driving == 0 && !armed, Rule::LostTimeTrips)?;
+        }
+        gesture(run)?;
+    }
+    Ok(())
+}
+
+/// After a trip: a repeated request is never granted, and a request after a pause is.
+pub(super) fn gesture<S: Subject>(mut run: Run<S>) -> Outcome {
+    let rule = Rule::ArmingIsAGesture;
+    for round in 0..150 {
+        // A program that stalls did not release its switch.
+        let stalls = round % 50 == 25;
+        if stalls {
+            run.ms += 200;
+            for motor in 0..run.subject.motors() {
+                run.hear(motor);
+            }
+        }
+        let now = run.now();
+        let outcome = run.subject.device().arm(now);
+        let is_early = matches!(outcome, Err(ArmError::NotReleased | ArmError::Setting(_)));
+        let refused = is_early || (stalls && outcome.is_err());
+        _ = run.subject.drive(1.0);
+        let output = run.step()?;
+        run.expect(refused && output.driving == 0, rule)?;
+    }
+    for _ in 0..100 {
+        run.step()?;
+    }
+    run.arm_and_open(rule)?;
+    let driven = run.step()?.driving > 0;
+    run.expect(driven, rule)
 }

@@ -3,6 +3,8 @@
 mod edges;
 mod rules;
 
+pub use rules::check_contract;
+
 use crate::frame::CanFrame;
 use crate::motor::{Claim, Devices, Ingest, Role, TargetError};
 use crate::time::{Instant, Tick};
@@ -180,43 +182,6 @@ impl core::fmt::Display for Violation {
 }
 
 impl core::error::Error for Violation {}
-
-/// Checks a device against the promises of [`Devices`]: makes fresh devices, plays their motors, and checks their
-/// frames.
-///
-/// # Examples
-/// ```
-/// use drivetrain::dji::{Bus, Config, Handle, M3508};
-/// use drivetrain::frame::CanFrame;
-/// use drivetrain::motor::TargetError;
-/// use drivetrain::sim::contract::{Subject, check_contract};
-/// use drivetrain::units::Current;
-///
-/// struct OneWheel(Bus, Handle<M3508>);
-///
-/// impl Subject for OneWheel {
-///     type Device = Bus;
-///     fn device(&mut self) -> &mut Bus { &mut self.0 }
-///     fn motors(&self) -> usize { 1 }
-///     fn feedback(&self, _motor: usize) -> Option<CanFrame> { CanFrame::standard(0x201, [0; 8]) }
-///     fn drive(&mut self, share: f32) -> Result<(), TargetError> {
-///         self.0.set_current(self.1, Current::from_amperes(5.0 * share))
-///     }
-/// }
-///
-/// let make = || {
-///     let mut bus = Bus::new();
-///     let wheel = bus.attach(Config::new(1)).expect("a free id");
-///     OneWheel(bus, wheel)
-/// };
-/// assert_eq!(check_contract(make), Ok(29)); // rules
-/// ```
-///
-/// # Errors
-/// The first rule that the device breaks.
-pub fn check_contract<S: Subject>(make: impl Fn() -> S) -> Result<usize, Violation> {
-    rules::check(&make)
-}
 
 type Outcome = Result<(), Violation>;
 

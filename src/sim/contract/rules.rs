@@ -4,8 +4,40 @@ use crate::motor::{ArmError, Claim, Devices, Ingest, Role, TargetError};
 use crate::time::Tick;
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 
-/// Checks every rule on devices of its own; returns how many there are.
-pub(super) fn check<S: Subject>(make: &impl Fn() -> S) -> Result<usize, Violation> {
+/// Checks a device against the promises of [`Devices`]: makes fresh devices, plays their motors, and checks their
+/// frames.
+///
+/// # Examples
+/// ```
+/// use drivetrain::dji::{Bus, Config, Handle, M3508};
+/// use drivetrain::frame::CanFrame;
+/// use drivetrain::motor::TargetError;
+/// use drivetrain::sim::contract::{Subject, check_contract};
+/// use drivetrain::units::Current;
+///
+/// struct OneWheel(Bus, Handle<M3508>);
+///
+/// impl Subject for OneWheel {
+///     type Device = Bus;
+///     fn device(&mut self) -> &mut Bus { &mut self.0 }
+///     fn motors(&self) -> usize { 1 }
+///     fn feedback(&self, _motor: usize) -> Option<CanFrame> { CanFrame::standard(0x201, [0; 8]) }
+///     fn drive(&mut self, share: f32) -> Result<(), TargetError> {
+///         self.0.set_current(self.1, Current::from_amperes(5.0 * share))
+///     }
+/// }
+///
+/// let make = || {
+///     let mut bus = Bus::new();
+///     let wheel = bus.attach(Config::new(1)).expect("a free id");
+///     OneWheel(bus, wheel)
+/// };
+/// assert_eq!(check_contract(make), Ok(29)); // rules
+/// ```
+///
+/// # Errors
+/// The first rule that the device breaks.
+pub fn check_contract<S: Subject>(make: impl Fn() -> S) -> Result<usize, Violation> {
     claims(Run::new(make()))?;
     disarmed(Run::new(make()))?;
     missing(Run::new(make()))?;
@@ -14,21 +46,21 @@ pub(super) fn check<S: Subject>(make: &impl Fn() -> S) -> Result<usize, Violatio
     rejected(Run::driving(make())?, Run::driving(make())?)?;
     not_fresh(Run::driving(make())?)?;
     late(Run::driving(make())?)?;
-    others(make)?;
+    others(&make)?;
     old_target(Run::driving(make())?)?;
     for share in [0.0, f32::NAN] {
         refused(Run::driving(make())?, share)?;
     }
     nan(Run::driving(make())?)?;
     unsupported(Run::driving(make())?, Run::driving(make())?)?;
-    bad_steps(make)?;
-    lost_time(make)?;
+    bad_steps(&make)?;
+    edges::lost_time(&make)?;
     requeue(Run::driving(make())?)?;
     emergency_stop(Run::driving(make())?)?;
     from_zero(Run::driving(make())?)?;
-    edges::fault(make)?;
-    edges::second_master(make)?;
-    edges::per_change(make)?;
+    edges::fault(&make)?;
+    edges::second_master(&make)?;
+    edges::per_change(&make)?;
     edges::lost_command(Run::driving(make())?)?;
     edges::wait(Run::driving(make())?)?;
     edges::flood(Run::driving(make())?)?;
@@ -239,51 +271,6 @@ fn bad_steps<S: Subject>(make: &impl Fn() -> S) -> Outcome {
     Ok(())
 }
 
-/// Updates that do not lie after the one before: zero in that cycle, and until the device is armed by a new request.
-fn lost_time<S: Subject>(make: &impl Fn() -> S) -> Outcome {
-    for back_ms in [0, 1, 5, 100, 350] {
-        let mut run = Run::driving(make())?;
-        run.step()?;
-        run.ms = run.ms.saturating_sub(back_ms).max(1);
-        for round in 0..50 {
-            _ = run.subject.drive(1.0);
-            let output = if round == 0 { run.update(0.001)? } else { run.step()? };
-            let armed = run.subject.device().is_armed();
-            run.expect(output.driving == 0 && !armed, Rule::LostTimeTrips)?;
-        }
-        gesture(run)?;
-    }
-    Ok(())
-}
-
-/// After a trip: a repeated request is never granted, and a request after a pause is.
-fn gesture<S: Subject>(mut run: Run<S>) -> Outcome {
-    let rule = Rule::ArmingIsAGesture;
-    for round in 0..150 {
-        // A program that stalls did not release its switch.
-        let stalls = round % 50 == 25;
-        if stalls {
-            run.ms += 200;
-            for motor in 0..run.subject.motors() {
-                run.hear(motor);
-            }
-        }
-        let now = run.now();
-        let outcome = run.subject.device().arm(now);
-        let is_early = matches!(outcome, Err(ArmError::NotReleased | ArmError::Setting(_)));
-        let refused = is_early || (stalls && outcome.is_err());
-        _ = run.subject.drive(1.0);
-        let output = run.step()?;
-        run.expect(refused && output.driving == 0, rule)?;
-    }
-    for _ in 0..100 {
-        run.step()?;
-    }
-    run.arm_and_open(rule)?;
-    let driven = run.step()?.driving > 0;
-    run.expect(driven, rule)
-}
-
 fn requeue<S: Subject>(mut run: Run<S>) -> Outcome {
     let Output { last: Some(frame), .. } = run.step()? else {
         return run.expect(false, Rule::ArmedDrives);
@@ -338,7 +325,7 @@ fn emergency_stop<S: Subject>(mut run: Run<S>) -> Outcome {
     let zero = run.step()?.driving == 0;
     let disarmed = !run.subject.device().is_armed();
     run.expect(zero && disarmed, rule)?;
-    gesture(run)
+    edges::gesture(run)
 }
 
 fn from_zero<S: Subject>(mut run: Run<S>) -> Outcome {
