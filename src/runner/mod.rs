@@ -298,7 +298,8 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     fn step(&mut self, tick: Tick, limit: impl FnOnce(&mut D), mut evicted: impl FnMut(&CanFrame)) {
         self.waiting = None;
         self.pending.hand_over(&mut evicted);
-        if self.stop.is_some_and(EmergencyStop::is_set) {
+        self.pending.was_stopped = self.stop.is_some_and(EmergencyStop::is_set);
+        if self.pending.was_stopped {
             self.device.emergency_stop();
         }
         self.sending(tick.now()).call_back(&mut evicted);
@@ -319,7 +320,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     fn send_waiting(&mut self) {
         let now = self.read_clock();
         let is_fresh = |ticked| ticked <= now && now.since(ticked) < self.ticker.period();
-        let is_stopped = self.stop.is_some_and(EmergencyStop::is_set)
+        let is_stopped = self.stop.is_some_and(EmergencyStop::is_set) && !self.pending.was_stopped
             || self.pending.was_armed && !self.device.is_armed();
         let has_place = self.pending.evicted.is_none();
         if has_place && self.watch.ticked().is_some_and(is_fresh) && !is_stopped {

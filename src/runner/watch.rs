@@ -253,13 +253,15 @@ pub(super) struct Pending {
     pub(super) waits: bool,
     /// The device was armed in the tick.
     pub(super) was_armed: bool,
+    /// The emergency stop was set in the tick.
+    pub(super) was_stopped: bool,
     /// A frame of others, evicted by a frame that waited. Polls offer no more frames then, until the next tick.
     pub(super) evicted: Option<CanFrame>,
 }
 
 impl Pending {
     pub(super) const NONE: Self =
-        Self { yields: None, waits: false, was_armed: false, evicted: None };
+        Self { yields: None, waits: false, was_armed: false, was_stopped: false, evicted: None };
 
     /// Begins a tick, whose update replaces the frames that wait.
     #[inline]

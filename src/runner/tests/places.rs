@@ -51,6 +51,21 @@ fn a_poll_offers_nothing_after_a_stop_and_after_the_period() {
     }
 }
 
+/// The frames of a tick under the stop are rest: they leave as soon as there is a place.
+#[test]
+fn a_poll_offers_the_rest_of_a_tick_that_saw_the_stop() {
+    static STOP: EmergencyStop = EmergencyStop::new();
+    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let (runner, wheels) = driving(&clock);
+    let mut runner = runner.with_emergency_stop(&STOP);
+    set(&mut runner, wheels, 2);
+    STOP.set();
+    tick_with_one_place(&mut runner, &clock);
+    clock.advance(Duration::from_micros(100));
+    runner.poll(8);
+    assert_eq!(offered(&mut runner), [(0x1FF, 0)]);
+}
+
 #[test]
 fn a_frame_of_others_evicted_by_a_poll_is_handed_back_by_the_next_tick() {
     let clock = ManualClock::new(Instant::from_micros(1_000));
