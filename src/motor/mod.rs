@@ -71,6 +71,7 @@ mod watch;
 pub(crate) use arming::Obstacles;
 pub use arming::{ArmError, ArmingSwitch, Missing, SwitchOrder, WrongSetting};
 pub use capability::{Capabilities, Capability};
+pub(crate) use claim::Route;
 pub use claim::{Claim, MotorName, Role};
 pub use device::{CanDevice, Ingest, Malformed, Visitor};
 pub use devices::Devices;

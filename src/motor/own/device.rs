@@ -1,12 +1,13 @@
 //! The motor as a device of the runner.
 
-use super::joint::{Inside, Start};
-use super::{INQUIRY, Offered, Order, Own, OwnMotor, Shaft, Target};
+use super::{Offered, Own, OwnMotor, Target};
 use crate::frame::CanFrame;
 use crate::motor::{
-    CanDevice, Claim, Condition, Ingest, Link, MotorName, Repeat, Role, WrongSetting,
+    AngleDrive, CanDevice, Capabilities, Capability, Claim, Condition, Devices, Ingest, MotorName,
+    Repeat, Role, TargetError, VelocityDrive, Visitor, WrongSetting,
 };
 use crate::time::{Edge, Instant, Tick, TimeStep};
+use crate::units::{Angle, AngularVelocity};
 use embedded_can::Frame;
 
 impl<M: OwnMotor> CanDevice for Own<M> {
@@ -154,246 +155,44 @@ impl<M: OwnMotor> CanDevice for Own<M> {
     }
 }
 
-impl<M: OwnMotor> Own<M> {
-    /// Tells whether the drive is enabled, and no frame but a command is due: the case of almost each cycle of a driven motor.
+impl<M: OwnMotor> Devices for Own<M> {
     #[inline]
-    fn is_steady(&self) -> bool {
-        let waits = self.switched.is_some() || self.switching.is_some() || self.offered.is_rest;
-        self.power.is_steady() && self.was_online && !waits
+    fn visit(&mut self, visitor: &mut impl Visitor) {
+        visitor.visit(self);
     }
 
-    /// Enables, disables, asks, commands and rests, as the motor may be driven or not.
-    #[inline(never)]
-    fn update_anyhow(&mut self, drives: bool, step: TimeStep, left: f32, now: Instant) {
-        let may_drive = drives && self.offered.may_repeat.admits(step.is_hold());
-        // A question that is given back from now on did not enable the drive, and rest that nobody took was not sent.
-        self.switched.take_if(|_| self.power.is_confirmed() && self.switching.is_none());
-        self.offered.is_rest &= !self.offered.waits;
-        self.withdraw();
-        self.has_posted = false;
-        let was_on = self.power.is_on();
-        self.switch(may_drive, now);
-        let may_drive = may_drive && self.guard.is_armed();
-        // Before the drive was on for certain, it was polled where rest would have disabled it.
-        self.offered.is_rest &= !was_on || self.power.is_on();
-        let inquiry = self.inquire(now);
-        let is_at_rest = !may_drive || !self.power.is_ready();
-        let command = self.act(may_drive, step, left);
-        // Between two frames of rest, another frame takes the place of one: the bus never has two of them at once to carry.
-        let has_other = self.has_posted || inquiry.is_some();
-        let gives_way = is_at_rest && self.offered.is_rest && has_other;
-        self.offer(if gives_way { inquiry } else { command });
-        self.offered.may_repeat = Repeat::after_update(!is_at_rest, step.is_hold());
-        let is_rest = |frame: CanFrame| is_at_rest && !gives_way && !frame.is_remote();
-        self.offered.is_rest = command.is_some_and(is_rest);
-    }
-
-    /// Checks the health of the motor and takes the reactions, which may relax the motor; returns the share of the output left.
-    fn check(&mut self, now: Instant) -> f32 {
-        let share = self.watch.check(&mut self.guard, || self.motor.vitals(), now);
-        if share <= 0.0 {
-            self.guard.relax();
-        }
-        if self.watch.soft_limits().is_some() && self.is_online() {
-            self.check_limits(now);
-        }
-        share
-    }
-
-    /// Returns a question for a setting. The question takes the place of a frame of rest after another one, so an update with a
-    /// question has no more frames. A drive reported as enabled gets rest instead.
-    fn inquire(&mut self, now: Instant) -> Option<CanFrame> {
-        // A drive that lost its supply is silent until it runs again.
-        let was_online =
-            core::mem::replace(&mut self.was_online, self.guard.link() == Link::Online);
-        if was_online && !self.was_online {
-            self.motor.forget_settings();
-        }
-        self.joint.place_zero(self.measured_angle());
-        let is_idle = !self.power.is_on() && !self.has_posted && self.offered.is_rest;
-        let is_due = now < self.inquired || now.since(self.inquired) >= INQUIRY;
-        if !is_idle || !is_due || self.motor.is_enabled() == Some(true) {
-            return None;
-        }
-        self.inquired = now;
-        self.motor.inquire()
-    }
-
-    /// Enables or disables the drive, if a frame is due: enabled from when the motor may be driven until no target is left.
-    fn switch(&mut self, may_drive: bool, now: Instant) {
-        if self.power.begin(now) {
-            self.disable();
-            if self.switched.is_some() {
-                return;
-            }
-        }
-        // A late motor whose target was not set anew stays enabled, and nothing enables it meanwhile, no frame that waits either.
-        let stays = self.guard.has_target() && self.power.is_on() && !self.rest_disables;
-        if stays && !may_drive {
-            if self.switching.is_some() {
-                self.give_back();
-                self.withdraw_switching();
-            }
-            return;
-        }
-        if !self.power.is_on() {
-            self.enabling = 0;
-        }
-        match self.power.step(may_drive, now) {
-            Some(true) => self.enable(now),
-            Some(false) => self.disable(),
-            None => {}
-        }
-        if may_drive && !self.power.is_ready() {
-            self.reopen();
-        }
-    }
-
-    fn enable(&mut self, now: Instant) {
-        if self.motor.wrong_setting().is_some_and(|wrong| wrong.found.is_some()) {
-            self.fail(now);
-            return;
-        }
-        // Of several frames none is left out: the one before still waits for the bus.
-        if self.switching.is_some() && self.enabling > 0 {
-            self.has_posted = true;
-            return;
-        }
-        self.withdraw_switching();
-        let frame = self.motor.enable(self.enabling);
-        self.enabling = self.enabling.saturating_add(1);
-        if frame.is_some() {
-            self.reopen();
-        }
-        self.post(frame);
-    }
-
-    fn disable(&mut self) {
-        self.withdraw_switching();
-        let frame = self.motor.disable();
-        self.rest_disables = frame.is_none();
-        self.post(frame);
-    }
-
-    /// A frame for the drive's power was not sent, and comes again.
-    const fn give_back(&mut self) {
-        self.power.give_back();
-        self.enabling = self.enabling.saturating_sub(1);
-    }
-
-    /// Offers a frame for the drive's power.
-    const fn post(&mut self, frame: Option<CanFrame>) {
-        (self.switched, self.switching) = (frame, frame);
-        self.has_posted = frame.is_some();
-    }
-
-    /// The drive did not follow before: its output opens from zero, and its angle starts from where the shaft is.
-    pub(super) fn reopen(&mut self) {
-        self.guard.reopen();
-        self.start = Start::NONE;
-    }
-
-    /// Returns the command of this step, or rest. If rest would disable a drive on the way to be enabled, returns the frame that asks
-    /// for feedback.
-    fn act(&mut self, may_drive: bool, step: TimeStep, left: f32) -> Option<CanFrame> {
-        if !may_drive || !self.power.is_ready() {
-            // A late motor keeps its integral, one without a target starts afresh.
-            if !self.guard.has_target() {
-                self.relax();
-            }
-            let polls = may_drive && self.switched.is_some() && self.rest_disables;
-            return if polls { self.motor.poll() } else { Some(self.rest()) };
-        }
-        if step.is_hold() {
-            return self.offered.frame;
-        }
-        Some(self.follow(step, left))
-    }
-
-    /// Returns the command of this step.
     #[inline]
-    fn follow(&mut self, step: TimeStep, left: f32) -> CanFrame {
-        self.is_resting = false;
-        let opened = self.guard.share();
-        let is_free = opened >= 1.0 && self.watch.soft_limits().is_none();
-        let target = if is_free { self.target } else { self.goal(opened) };
-        let share = if left < opened { left } else { opened };
-        self.motor.control(Order { target, share, step })
+    fn usual_feedback(&self) -> Option<(u32, u32)> {
+        self.route.usual()
     }
 
-    /// Returns the target as far as the output range is open, and within the soft limits.
-    fn goal(&mut self, opened: f32) -> Target {
-        let (shaft, inside) = self.shaft();
-        self.start.goal(self.target, opened, shaft, inside)
+    #[inline]
+    fn next_frame(&mut self, _turn: u32) -> Option<CanFrame> {
+        CanDevice::next_frame(self)
+    }
+}
+
+/// There is one motor, so its handle is `()`.
+impl<M: OwnMotor> VelocityDrive<()> for Own<M> {
+    fn velocity(&self, (): ()) -> Option<AngularVelocity> {
+        self.is_online().then(|| self.motor.velocity() * self.joint.sign)
     }
 
-    pub(super) fn shaft(&self) -> (Shaft, Option<Inside>) {
-        let shaft = (self.motor.angle(), self.motor.velocity());
-        let limits = self.watch.soft_limits();
-        (shaft, limits.and_then(|limits| self.joint.inside(limits, shaft)))
+    fn capabilities(&self, (): ()) -> Capabilities {
+        self.motor.capabilities()
     }
 
-    /// Notes whether the shaft is at a soft limit.
-    #[inline(never)]
-    fn check_limits(&mut self, now: Instant) {
-        let ((angle, _), inside) = self.shaft();
-        let is_lost = angle.is_none() && self.joint.has_limits();
-        if is_lost {
-            self.guard.relax();
-        }
-        self.guard.latch(now, |latch| Inside::check(inside, is_lost, latch));
+    fn set_velocity(&mut self, (): (), target: AngularVelocity) -> Result<(), TargetError> {
+        self.set(Capability::Velocity, Target::Velocity(target))
+    }
+}
+
+impl<M: OwnMotor> AngleDrive<()> for Own<M> {
+    fn angle(&self, (): ()) -> Option<Angle> {
+        Some((self.measured_angle()? - self.joint.zero()?) * self.joint.sign)
     }
 
-    fn relax(&mut self) {
-        self.start = Start::NONE;
-        if !self.is_resting {
-            self.motor.reset();
-            self.is_resting = true;
-        }
-    }
-
-    /// Rests at once, between two updates.
-    fn stop(&mut self) {
-        self.relax();
-        if self.power.stop() {
-            self.disable();
-        } else if self.offered.is_rest {
-            // At rest already: a program that disarms in each tick must not keep the questions from their turn.
-            return;
-        }
-        self.offered.is_rest = false;
-        let rest = self.rest();
-        self.offer(Some(rest));
-    }
-
-    /// Returns the frame of rest: no question unless rest was sent before.
-    fn rest(&mut self) -> CanFrame {
-        let frame = self.motor.rest();
-        if frame.is_remote() && !self.offered.is_rest { self.motor.rest() } else { frame }
-    }
-
-    fn offer(&mut self, command: Option<CanFrame>) {
-        self.withdraw();
-        let (frame, waits) = (command.or(self.offered.frame), command.is_some());
-        self.offered = Offered { frame, waits, ..Offered::NOTHING };
-    }
-
-    /// Takes back a frame still waiting for the bus.
-    fn withdraw(&mut self) {
-        if let (true, Some(frame)) = (core::mem::take(&mut self.offered.waits), self.offered.frame)
-        {
-            self.leave_out(&frame);
-        }
-    }
-
-    fn withdraw_switching(&mut self) {
-        if let Some(frame) = self.switching.take() {
-            self.leave_out(&frame);
-        }
-    }
-
-    fn leave_out(&mut self, frame: &CanFrame) {
-        self.superseded = self.superseded.wrapping_add(1);
-        self.motor.unsent(frame);
+    fn set_angle(&mut self, (): (), target: Angle) -> Result<(), TargetError> {
+        self.set(Capability::Angle, Target::Angle(target))
     }
 }

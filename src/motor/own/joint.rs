@@ -1,12 +1,9 @@
 //! The joint on the shaft of the drive: targets and measurements in its own direction, from its own zero.
 
-use super::{Impedance, Own, OwnMotor, Shaft, Target};
+use super::{Impedance, Shaft, Target};
 use crate::control::limited;
 use crate::math::wrap_pi;
-use crate::motor::{
-    AngleDrive, Capabilities, Capability, Condition, Latch, TargetError, VelocityDrive,
-    check_soft_limits,
-};
+use crate::motor::{Condition, Latch, TargetError, check_soft_limits};
 use crate::units::{Angle, AngularVelocity};
 use core::f32::consts::TAU;
 
@@ -135,7 +132,7 @@ impl Joint {
         (self.zero, self.last) = (Zero::Lost, None);
     }
 
-    const fn zero(&self) -> Option<Angle> {
+    pub(super) const fn zero(&self) -> Option<Angle> {
         match self.zero {
             Zero::OfDrive => Some(Angle::ZERO),
             Zero::Placed(zero) | Zero::Found(zero) => Some(zero),
@@ -344,31 +341,6 @@ impl Start {
             }
             (target, _) => target,
         }
-    }
-}
-
-/// There is one motor, so its handle is `()`.
-impl<M: OwnMotor> VelocityDrive<()> for Own<M> {
-    fn velocity(&self, (): ()) -> Option<AngularVelocity> {
-        self.is_online().then(|| self.motor.velocity() * self.joint.sign)
-    }
-
-    fn capabilities(&self, (): ()) -> Capabilities {
-        self.motor.capabilities()
-    }
-
-    fn set_velocity(&mut self, (): (), target: AngularVelocity) -> Result<(), TargetError> {
-        self.set(Capability::Velocity, Target::Velocity(target))
-    }
-}
-
-impl<M: OwnMotor> AngleDrive<()> for Own<M> {
-    fn angle(&self, (): ()) -> Option<Angle> {
-        Some((self.measured_angle()? - self.joint.zero()?) * self.joint.sign)
-    }
-
-    fn set_angle(&mut self, (): (), target: Angle) -> Result<(), TargetError> {
-        self.set(Capability::Angle, Target::Angle(target))
     }
 }
 

@@ -7,8 +7,8 @@ mod mode;
 mod motor;
 mod power;
 mod registers;
-mod route;
 mod settings;
+mod update;
 
 pub use crate::wire::mit::impedance::Impedance;
 pub use impedance::ImpedanceControl;
@@ -23,18 +23,16 @@ pub(crate) use registers::{
 pub(crate) use settings::{Inquiry, Preparation, Settings, TimeoutUnits};
 
 use super::{
-    BusLoad, Capability, Claim, Condition, Guard, Health, HealthConfig, Ingest, Link, Repeat, Role,
-    TargetError, Timeouts, Vitals, Watch,
+    BusLoad, Capability, Claim, Condition, Guard, Health, HealthConfig, Link, Repeat, Role, Route,
+    TargetError, Timeouts, Watch,
 };
 use crate::control::PidConfig;
 use crate::error::{ConfigError, finite};
 use crate::frame::CanFrame;
 use crate::time::{Duration, Instant};
 use crate::units::Angle;
-use embedded_can::Frame;
-use joint::{Joint, Reading, Start, Zero};
+use joint::{Inside, Joint, Start, Zero};
 use power::Power;
-use route::{Offered, Route};
 
 /// The most frames a second for the power of a drive, each beside a command or rest.
 const POWER_HZ: u32 = 100;
@@ -308,94 +306,34 @@ impl<M: OwnMotor> Own<M> {
     fn is_online(&self) -> bool {
         self.guard.link() == Link::Online
     }
+
+    fn shaft(&self) -> (Shaft, Option<Inside>) {
+        let shaft = (self.motor.angle(), self.motor.velocity());
+        let limits = self.watch.soft_limits();
+        (shaft, limits.and_then(|limits| self.joint.inside(limits, shaft)))
+    }
+
+    /// The drive did not follow before: its output opens from zero, and its angle starts from where the shaft is.
+    fn reopen(&mut self) {
+        self.guard.reopen();
+        self.start = Start::NONE;
+    }
 }
 
-/// Received frames: feedback, answers, and commands of another controller.
-impl<M: OwnMotor> Own<M> {
-    /// Takes a frame with an id of the feedback.
-    pub(super) fn take(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
-        if self.motor.decode_answer(frame) {
-            return Ingest::Taken;
-        }
-        let gap_us = self.guard.gap_us(now);
-        let outcome = self.motor.decode(frame);
-        if outcome == Ingest::Taken {
-            self.hear(gap_us, now);
-            let gap_us = gap_us.unwrap_or(0);
-            if gap_us > SILENCE_US || self.joint.depends_on_supply() {
-                self.doubt(gap_us, now);
-            }
-        }
-        outcome
-    }
+/// The frame of the last update: a command, rest, or a frame in the place of either.
+#[derive(Debug, Clone, Copy)]
+struct Offered {
+    /// `None` before the first.
+    frame: Option<CanFrame>,
+    /// The frame is still to be taken.
+    waits: bool,
+    /// A command, which an update without a step may send once more.
+    may_repeat: Repeat,
+    /// Rest, not given back by the driver.
+    is_rest: bool,
+}
 
-    /// Asks whether the drive started again: in a silence, unless feedback is late only after more, or before an angle that jumped. The
-    /// joint stays where it is, with its target; without its zero, it trips.
-    #[cold]
-    #[inline(never)]
-    fn doubt(&mut self, gap_us: u32, now: Instant) {
-        let is_silence = gap_us > SILENCE_US && self.guard.is_late_by(gap_us);
-        if is_silence {
-            self.motor.forget_settings();
-        }
-        if !self.joint.depends_on_supply() {
-            return;
-        }
-        let (velocity, at) = (self.motor.velocity(), now.stamp());
-        let reading = self.motor.angle().map(|angle| Reading { angle, velocity, at });
-        match self.joint.follow(reading, gap_us, is_silence) {
-            None => {
-                self.guard.note(Condition::PositionUncertain, true, now);
-                self.fail(now);
-            }
-            Some(turns) if turns.as_radians() != 0.0 => {
-                self.target = self.target.moved(turns);
-                self.start.turn(turns);
-                self.offered.may_repeat = Repeat::NO;
-            }
-            Some(_) => {}
-        }
-    }
-
-    #[inline(always)]
-    fn hear(&mut self, gap_us: Option<u32>, now: Instant) {
-        self.watch.hear(gap_us, now);
-        self.guard.hear(now);
-        if self.power.hear(self.motor.is_enabled(), now) {
-            self.fail(now);
-            self.motor.forget_settings();
-        }
-    }
-
-    #[inline(never)]
-    pub(super) fn take_by_claims(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
-        if frame.is_remote() {
-            return Ingest::Unrelated;
-        }
-        if self.route.is_unknown() {
-            self.route = Route::of(|| self.motor.claims());
-        }
-        let (mut is_feedback, mut command) = (false, None);
-        for claim in self.motor.claims().into_iter().filter(|claim| claim.covers(frame.id())) {
-            match claim.role() {
-                Role::Feedback => is_feedback = true,
-                // What others send on a shared id may be for another drive.
-                Role::Command if claim.is_shared() => {}
-                Role::Command => command = Some(claim),
-            }
-        }
-        let outcome = if is_feedback { self.take(frame, now) } else { Ingest::Unrelated };
-        if outcome == Ingest::Unrelated && command.is_some() {
-            self.rival = command;
-            self.watch.hear_rival(now);
-        }
-        outcome
-    }
-
-    /// Trips the motor as by a fault that the drive reports in one update.
-    fn fail(&mut self, now: Instant) {
-        let vitals = Vitals { has_fault: true, ..self.motor.vitals() };
-        _ = self.watch.check(&mut self.guard, || vitals, now);
-        self.guard.relax_until_armed();
-    }
+impl Offered {
+    const NOTHING: Self =
+        Self { frame: None, waits: false, may_repeat: Repeat::NO, is_rest: false };
 }

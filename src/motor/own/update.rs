@@ -1,0 +1,330 @@
+//! What a motor does with a frame of its drive, and in an update.
+
+use super::joint::{Inside, Reading, Start};
+use super::{INQUIRY, Offered, Order, Own, OwnMotor, SILENCE_US, Target};
+use crate::frame::CanFrame;
+use crate::motor::{Condition, Ingest, Link, Repeat, Role, Route, Vitals};
+use crate::time::{Instant, TimeStep};
+use embedded_can::Frame;
+
+/// Received frames: feedback, answers, and commands of another controller.
+impl<M: OwnMotor> Own<M> {
+    /// Takes a frame with an id of the feedback.
+    pub(super) fn take(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
+        if self.motor.decode_answer(frame) {
+            return Ingest::Taken;
+        }
+        let gap_us = self.guard.gap_us(now);
+        let outcome = self.motor.decode(frame);
+        if outcome == Ingest::Taken {
+            self.hear(gap_us, now);
+            let gap_us = gap_us.unwrap_or(0);
+            if gap_us > SILENCE_US || self.joint.depends_on_supply() {
+                self.doubt(gap_us, now);
+            }
+        }
+        outcome
+    }
+
+    /// Asks whether the drive started again: in a silence, unless feedback is late only after more, or before an angle that jumped. The
+    /// joint stays where it is, with its target; without its zero, it trips.
+    #[cold]
+    #[inline(never)]
+    fn doubt(&mut self, gap_us: u32, now: Instant) {
+        let is_silence = gap_us > SILENCE_US && self.guard.is_late_by(gap_us);
+        if is_silence {
+            self.motor.forget_settings();
+        }
+        if !self.joint.depends_on_supply() {
+            return;
+        }
+        let (velocity, at) = (self.motor.velocity(), now.stamp());
+        let reading = self.motor.angle().map(|angle| Reading { angle, velocity, at });
+        match self.joint.follow(reading, gap_us, is_silence) {
+            None => {
+                self.guard.note(Condition::PositionUncertain, true, now);
+                self.fail(now);
+            }
+            Some(turns) if turns.as_radians() != 0.0 => {
+                self.target = self.target.moved(turns);
+                self.start.turn(turns);
+                self.offered.may_repeat = Repeat::NO;
+            }
+            Some(_) => {}
+        }
+    }
+
+    #[inline(always)]
+    fn hear(&mut self, gap_us: Option<u32>, now: Instant) {
+        self.watch.hear(gap_us, now);
+        self.guard.hear(now);
+        if self.power.hear(self.motor.is_enabled(), now) {
+            self.fail(now);
+            self.motor.forget_settings();
+        }
+    }
+
+    #[inline(never)]
+    pub(super) fn take_by_claims(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
+        if frame.is_remote() {
+            return Ingest::Unrelated;
+        }
+        if self.route.is_unknown() {
+            self.route = Route::of(|| self.motor.claims());
+        }
+        let (mut is_feedback, mut command) = (false, None);
+        for claim in self.motor.claims().into_iter().filter(|claim| claim.covers(frame.id())) {
+            match claim.role() {
+                Role::Feedback => is_feedback = true,
+                // What others send on a shared id may be for another drive.
+                Role::Command if claim.is_shared() => {}
+                Role::Command => command = Some(claim),
+            }
+        }
+        let outcome = if is_feedback { self.take(frame, now) } else { Ingest::Unrelated };
+        if outcome == Ingest::Unrelated && command.is_some() {
+            self.rival = command;
+            self.watch.hear_rival(now);
+        }
+        outcome
+    }
+
+    /// Trips the motor as by a fault that the drive reports in one update.
+    fn fail(&mut self, now: Instant) {
+        let vitals = Vitals { has_fault: true, ..self.motor.vitals() };
+        _ = self.watch.check(&mut self.guard, || vitals, now);
+        self.guard.relax_until_armed();
+    }
+}
+
+impl<M: OwnMotor> Own<M> {
+    /// Tells whether the drive is enabled, and no frame but a command is due: the case of almost each cycle of a driven motor.
+    #[inline]
+    pub(super) fn is_steady(&self) -> bool {
+        let waits = self.switched.is_some() || self.switching.is_some() || self.offered.is_rest;
+        self.power.is_steady() && self.was_online && !waits
+    }
+
+    /// Enables, disables, asks, commands and rests, as the motor may be driven or not.
+    #[inline(never)]
+    pub(super) fn update_anyhow(&mut self, drives: bool, step: TimeStep, left: f32, now: Instant) {
+        let may_drive = drives && self.offered.may_repeat.admits(step.is_hold());
+        // A question that is given back from now on did not enable the drive, and rest that nobody took was not sent.
+        self.switched.take_if(|_| self.power.is_confirmed() && self.switching.is_none());
+        self.offered.is_rest &= !self.offered.waits;
+        self.withdraw();
+        self.has_posted = false;
+        let was_on = self.power.is_on();
+        self.switch(may_drive, now);
+        let may_drive = may_drive && self.guard.is_armed();
+        // Before the drive was on for certain, it was polled where rest would have disabled it.
+        self.offered.is_rest &= !was_on || self.power.is_on();
+        let inquiry = self.inquire(now);
+        let is_at_rest = !may_drive || !self.power.is_ready();
+        let command = self.act(may_drive, step, left);
+        // Between two frames of rest, another frame takes the place of one: the bus never has two of them at once to carry.
+        let has_other = self.has_posted || inquiry.is_some();
+        let gives_way = is_at_rest && self.offered.is_rest && has_other;
+        self.offer(if gives_way { inquiry } else { command });
+        self.offered.may_repeat = Repeat::after_update(!is_at_rest, step.is_hold());
+        let is_rest = |frame: CanFrame| is_at_rest && !gives_way && !frame.is_remote();
+        self.offered.is_rest = command.is_some_and(is_rest);
+    }
+
+    /// Checks the health of the motor and takes the reactions, which may relax the motor; returns the share of the output left.
+    pub(super) fn check(&mut self, now: Instant) -> f32 {
+        let share = self.watch.check(&mut self.guard, || self.motor.vitals(), now);
+        if share <= 0.0 {
+            self.guard.relax();
+        }
+        if self.watch.soft_limits().is_some() && self.is_online() {
+            self.check_limits(now);
+        }
+        share
+    }
+
+    /// Returns a question for a setting. The question takes the place of a frame of rest after another one, so an update with a
+    /// question has no more frames. A drive reported as enabled gets rest instead.
+    fn inquire(&mut self, now: Instant) -> Option<CanFrame> {
+        // A drive that lost its supply is silent until it runs again.
+        let was_online =
+            core::mem::replace(&mut self.was_online, self.guard.link() == Link::Online);
+        if was_online && !self.was_online {
+            self.motor.forget_settings();
+        }
+        self.joint.place_zero(self.measured_angle());
+        let is_idle = !self.power.is_on() && !self.has_posted && self.offered.is_rest;
+        let is_due = now < self.inquired || now.since(self.inquired) >= INQUIRY;
+        if !is_idle || !is_due || self.motor.is_enabled() == Some(true) {
+            return None;
+        }
+        self.inquired = now;
+        self.motor.inquire()
+    }
+
+    /// Enables or disables the drive, if a frame is due: enabled from when the motor may be driven until no target is left.
+    fn switch(&mut self, may_drive: bool, now: Instant) {
+        if self.power.begin(now) {
+            self.disable();
+            if self.switched.is_some() {
+                return;
+            }
+        }
+        // A late motor whose target was not set anew stays enabled, and nothing enables it meanwhile, no frame that waits either.
+        let stays = self.guard.has_target() && self.power.is_on() && !self.rest_disables;
+        if stays && !may_drive {
+            if self.switching.is_some() {
+                self.give_back();
+                self.withdraw_switching();
+            }
+            return;
+        }
+        if !self.power.is_on() {
+            self.enabling = 0;
+        }
+        match self.power.step(may_drive, now) {
+            Some(true) => self.enable(now),
+            Some(false) => self.disable(),
+            None => {}
+        }
+        if may_drive && !self.power.is_ready() {
+            self.reopen();
+        }
+    }
+
+    fn enable(&mut self, now: Instant) {
+        if self.motor.wrong_setting().is_some_and(|wrong| wrong.found.is_some()) {
+            self.fail(now);
+            return;
+        }
+        // Of several frames none is left out: the one before still waits for the bus.
+        if self.switching.is_some() && self.enabling > 0 {
+            self.has_posted = true;
+            return;
+        }
+        self.withdraw_switching();
+        let frame = self.motor.enable(self.enabling);
+        self.enabling = self.enabling.saturating_add(1);
+        if frame.is_some() {
+            self.reopen();
+        }
+        self.post(frame);
+    }
+
+    fn disable(&mut self) {
+        self.withdraw_switching();
+        let frame = self.motor.disable();
+        self.rest_disables = frame.is_none();
+        self.post(frame);
+    }
+
+    /// A frame for the drive's power was not sent, and comes again.
+    pub(super) const fn give_back(&mut self) {
+        self.power.give_back();
+        self.enabling = self.enabling.saturating_sub(1);
+    }
+
+    /// Offers a frame for the drive's power.
+    const fn post(&mut self, frame: Option<CanFrame>) {
+        (self.switched, self.switching) = (frame, frame);
+        self.has_posted = frame.is_some();
+    }
+
+    /// Returns the command of this step, or rest. If rest would disable a drive on the way to be enabled, returns the frame that asks
+    /// for feedback.
+    fn act(&mut self, may_drive: bool, step: TimeStep, left: f32) -> Option<CanFrame> {
+        if !may_drive || !self.power.is_ready() {
+            // A late motor keeps its integral, one without a target starts afresh.
+            if !self.guard.has_target() {
+                self.relax();
+            }
+            let polls = may_drive && self.switched.is_some() && self.rest_disables;
+            return if polls { self.motor.poll() } else { Some(self.rest()) };
+        }
+        if step.is_hold() {
+            return self.offered.frame;
+        }
+        Some(self.follow(step, left))
+    }
+
+    /// Returns the command of this step.
+    #[inline]
+    pub(super) fn follow(&mut self, step: TimeStep, left: f32) -> CanFrame {
+        self.is_resting = false;
+        let opened = self.guard.share();
+        let is_free = opened >= 1.0 && self.watch.soft_limits().is_none();
+        let target = if is_free { self.target } else { self.goal(opened) };
+        let share = if left < opened { left } else { opened };
+        self.motor.control(Order { target, share, step })
+    }
+
+    /// Returns the target as far as the output range is open, and within the soft limits.
+    fn goal(&mut self, opened: f32) -> Target {
+        let (shaft, inside) = self.shaft();
+        self.start.goal(self.target, opened, shaft, inside)
+    }
+
+    /// Notes whether the shaft is at a soft limit.
+    #[inline(never)]
+    fn check_limits(&mut self, now: Instant) {
+        let ((angle, _), inside) = self.shaft();
+        let is_lost = angle.is_none() && self.joint.has_limits();
+        if is_lost {
+            self.guard.relax();
+        }
+        self.guard.latch(now, |latch| Inside::check(inside, is_lost, latch));
+    }
+
+    pub(super) fn relax(&mut self) {
+        self.start = Start::NONE;
+        if !self.is_resting {
+            self.motor.reset();
+            self.is_resting = true;
+        }
+    }
+
+    /// Rests at once, between two updates.
+    pub(super) fn stop(&mut self) {
+        self.relax();
+        if self.power.stop() {
+            self.disable();
+        } else if self.offered.is_rest {
+            // At rest already: a program that disarms in each tick must not keep the questions from their turn.
+            return;
+        }
+        self.offered.is_rest = false;
+        let rest = self.rest();
+        self.offer(Some(rest));
+    }
+
+    /// Returns the frame of rest: no question unless rest was sent before.
+    fn rest(&mut self) -> CanFrame {
+        let frame = self.motor.rest();
+        if frame.is_remote() && !self.offered.is_rest { self.motor.rest() } else { frame }
+    }
+
+    fn offer(&mut self, command: Option<CanFrame>) {
+        self.withdraw();
+        let (frame, waits) = (command.or(self.offered.frame), command.is_some());
+        self.offered = Offered { frame, waits, ..Offered::NOTHING };
+    }
+
+    /// Takes back a frame still waiting for the bus.
+    pub(super) fn withdraw(&mut self) {
+        if let (true, Some(frame)) = (core::mem::take(&mut self.offered.waits), self.offered.frame)
+        {
+            self.leave_out(&frame);
+        }
+    }
+
+    fn withdraw_switching(&mut self) {
+        if let Some(frame) = self.switching.take() {
+            self.leave_out(&frame);
+        }
+    }
+
+    pub(super) fn leave_out(&mut self, frame: &CanFrame) {
+        self.superseded = self.superseded.wrapping_add(1);
+        self.motor.unsent(frame);
+    }
+}
