@@ -3,8 +3,7 @@
 //! | item | meaning |
 //! |---|---|
 //! | [`Instant`], [`Duration`] | microseconds in 64 bits; they never wrap |
-//! | [`Clock`] | the source of `now`, used by the runner only |
-//! | [`ManualClock`] | a clock that a test moves by hand |
+//! | [`Clock`] | the source of `now`, used by the runner only; in a test, a `&Cell<Instant>` set by hand |
 //! | [`ExtendedCounter`] | a 16- or 32-bit hardware counter, extended to an [`Instant`] |
 //! | [`Ticker`], [`Tick`] | the cadence of the control loop, without drift, overruns counted |
 //! | [`TimeStep`] | the step of a tick, validated once for all loops |
@@ -24,7 +23,7 @@ mod clock;
 mod instant;
 mod ticker;
 
-pub use clock::{Clock, ExtendedCounter, ManualClock};
+pub use clock::{Clock, ExtendedCounter};
 pub use instant::{Duration, Instant};
 pub use ticker::{Tick, Ticker, TimeStep};
 

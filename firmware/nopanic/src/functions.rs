@@ -20,7 +20,7 @@ use drivetrain::runner::{
     BlockingTx, EmergencyStop, FrameQueue, FrameReceiver, FrameSender, Nb, Runner, Statistics,
 };
 use drivetrain::time::TimeStep;
-use drivetrain::time::{Clock, Duration, ExtendedCounter, Instant, ManualClock, Tick, Ticker};
+use drivetrain::time::{Clock, Duration, ExtendedCounter, Instant, Tick, Ticker};
 use drivetrain::units::{Angle, AngularVelocity, Current, Voltage};
 use embedded_can::{ErrorKind, Frame, Id};
 
@@ -111,10 +111,6 @@ fn time() {
     ExtendedCounter::new_16_bit.call();
     ExtendedCounter::new_32_bit.call();
     ExtendedCounter::extend.call();
-    ManualClock::new.call();
-    ManualClock::now.call();
-    ManualClock::advance.call();
-    ManualClock::set.call();
     Tick::new.call();
     Tick::now.call();
     Tick::dt_s.call();

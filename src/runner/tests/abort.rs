@@ -3,8 +3,9 @@
 use super::super::*;
 use super::{Answer, frame};
 use crate::dji::{Bus, Config, M3508};
-use crate::time::{Instant, ManualClock};
+use crate::time::Instant;
 use crate::units::Current;
+use core::cell::Cell;
 use embedded_can::ErrorKind;
 use std::vec::Vec;
 
@@ -57,14 +58,14 @@ fn pulled<P: Port>(
     mailboxes: impl Fn(&mut P) -> &mut Mailboxes,
     out_ms: u64,
 ) -> (Vec<i16>, Option<u64>) {
-    let clock = ManualClock::new(Instant::START);
+    let clock = Cell::new(Instant::START);
     let mut bus = Bus::new();
     let wheel = bus.attach(Config::<M3508>::at_once(1)).unwrap();
     let mut runner =
         Runner::new(port(Mailboxes { is_plugged: true, ..Mailboxes::default() }), &clock, bus);
     let mut down = None;
     for ms in 1..=20 + out_ms {
-        clock.advance(Duration::from_millis(1));
+        clock.set(clock.get() + Duration::from_millis(1));
         mailboxes(runner.port_mut()).is_plugged = ms < 20;
         mailboxes(runner.port_mut()).run();
         runner.poll(8);
@@ -110,7 +111,7 @@ fn with_an_abort_frames_after_a_pulled_plug_are_of_the_last_tick() {
 
 #[test]
 fn frames_of_others_that_are_called_back_are_handed_over() {
-    let clock = ManualClock::new(Instant::START);
+    let clock = Cell::new(Instant::START);
     let mut runner = Runner::new(NbAbort(Nb(Mailboxes::default())), &clock, Bus::new());
     embedded_can::nb::Can::transmit(&mut runner.port_mut().0.0, &frame(0x123, [7; 8])).unwrap();
     let mut others = Vec::new();
