@@ -17,9 +17,7 @@ mod parse;
 
 use drivetrain::frame::CanFrame;
 use drivetrain::geometry::Vec2;
-use drivetrain::sim::{
-    ChassisConfig, JointConfig, Line, MotorConfig, MotorKey, Sender, Simulation, Wheel,
-};
+use drivetrain::sim::{ChassisConfig, Line, MotorConfig, MotorKey, Sender, Simulation, Wheel};
 use drivetrain::time::Instant;
 use parse::{Outcome, fault, frame, instant, line};
 use std::fmt::Write as _;
@@ -62,7 +60,8 @@ impl World {
                 done()
             }
             "joint" => {
-                self.motors.push(self.simulation.attach_joint(JointConfig::new(next()?.parse()?))?);
+                let joint = self.simulation.attach_joint(Line::Can1, next()?.parse()?, None)?;
+                self.motors.push(joint);
                 done()
             }
             "body" => {
