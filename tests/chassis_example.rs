@@ -29,7 +29,6 @@ mod verdict;
 use drivetrain::chassis::ChassisMode;
 
 use drivetrain::wire::Deframer;
-use drivetrain::wire::vofa::JustFloat;
 
 use modes::Drive;
 use scenario::{Run, Sample, Scenario, Trouble};
@@ -226,9 +225,9 @@ fn the_justfloat_stream_reads_back_as_the_samples() {
     let run = run(1, None);
     let bytes = justfloat::stream(&run.samples).unwrap();
     let mut rest = &bytes[..];
-    let mut reader = Deframer::<JustFloat<{ justfloat::CHANNELS }>, 64>::new();
+    let mut reader = Deframer::<[f32; justfloat::CHANNELS], 64>::new();
     for sample in &run.samples {
-        let JustFloat(channels) = reader.read(&mut rest).unwrap();
+        let channels = reader.read(&mut rest).unwrap();
         assert_eq!(&channels[..4], &sample.target_rpm.into_array());
         assert_eq!(&channels[4..], &sample.measured_rpm.into_array());
     }
