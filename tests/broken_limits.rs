@@ -269,14 +269,27 @@ fn a_health_configuration_that_makes_no_sense_is_refused() {
 #[cfg(feature = "hal")]
 #[test]
 fn a_motor_on_pins_with_a_limit_that_is_none_is_refused() {
-    use drivetrain::pwm::RcConfig;
+    use drivetrain::pwm::RcPwm;
+    use embedded_hal::pwm::{ErrorType, SetDutyCycle};
+    struct Channel;
+    impl ErrorType for Channel {
+        type Error = core::convert::Infallible;
+    }
+    impl SetDutyCycle for Channel {
+        fn max_duty_cycle(&self) -> u16 {
+            20_000
+        }
+        fn set_duty_cycle(&mut self, _: u16) -> Result<(), Self::Error> {
+            Ok(())
+        }
+    }
     let speed = AngularVelocity::from_rad_per_s;
     let motor = BrushedConfig::new(1).with_encoder(1_320.0, 16);
     for bad in NOT_FINITE.into_iter().chain([0.0, -0.5]) {
         assert!(motor.with_limit(bad).validate().is_err(), "{bad}");
         assert!(motor.with_no_load_speed(speed(bad)).validate().is_err(), "{bad}");
         assert!(motor.with_velocity_filter(bad).validate().is_err() == (bad != 0.0), "{bad}");
-        assert!(RcConfig::new().with_full_speed(speed(bad)).validate().is_err(), "{bad}");
+        assert!(RcPwm::new(Channel).with_full_speed(speed(bad)).is_err(), "{bad}");
     }
     assert!(motor.with_limit(0.5).with_no_load_speed(speed(30.0)).validate().is_ok());
 }
