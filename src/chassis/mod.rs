@@ -100,7 +100,6 @@ pub use odometry::Odometry;
 pub use omni::{Differential, Omni};
 pub use power::{PowerFit, PowerModel, WheelLoad};
 pub use power_buffer::{CapacitorPlan, PowerBuffer};
-pub use steering::SwerveSteering;
 pub use swerve::{ModuleState, Swerve};
 
 use crate::error::ConfigError;

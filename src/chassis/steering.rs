@@ -28,12 +28,12 @@ impl<const N: usize> Swerve<N> {
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::{chassis::{Swerve, SwerveSteering}, geometry::{Twist, Vec2}, units::Angle};
+    /// use drivetrain::{chassis::Swerve, geometry::{Twist, Vec2}, units::Angle};
     ///
     /// let swerve = Swerve::new(0.1, [Vec2::new(0.3, 0.0), Vec2::new(-0.3, 0.0)])?
     ///     .with_hysteresis(Angle::from_degrees(20.0));
     /// let left = swerve.inverse(Twist::new(-0.1763, 1.0, 0.0)); // 100 degrees
-    /// let [front, _] = swerve.steer(&mut SwerveSteering::new(), left, [Some(Angle::ZERO); 2]);
+    /// let [front, _] = swerve.steer(&mut [None; 2], left, [Some(Angle::ZERO); 2]);
     /// assert!((front.angle.as_degrees() - 100.0).abs() < 0.3); // and not -80 with the drive reversed
     /// # Ok::<(), drivetrain::error::ConfigError>(())
     /// ```
@@ -63,26 +63,6 @@ const fn size(value: f32) -> f32 {
     if value.is_nan() { 0.0 } else { value.abs() }
 }
 
-/// Memory of the modules of a [`Swerve`] from tick to tick: the commanded angle of each.
-///
-/// [`Chassis`](super::Chassis) keeps this memory. Without a chassis, keep it beside the layout for [`Swerve::steer`]
-/// and [`Swerve::lock`], and take a new memory when the motors were relaxed.
-///
-/// # Examples
-/// ```
-/// use drivetrain::{chassis::{ModuleState, Swerve, SwerveSteering}, geometry::Vec2, units::Angle};
-///
-/// let swerve = Swerve::new(0.1, [Vec2::new(0.3, 0.0), Vec2::new(-0.3, 0.0)])?;
-/// let mut steering = SwerveSteering::new();
-/// let measured = [70.0, -20.0].map(|degrees| Some(Angle::from_degrees(degrees)));
-/// let [front, rear] = swerve.steer(&mut steering, [ModuleState::default(); 2], measured);
-/// assert!((front.angle.as_degrees() - 70.0).abs() < 1e-4); // told to stand, each holds its angle
-/// assert!((rear.angle.as_degrees() + 20.0).abs() < 1e-4);
-/// # Ok::<(), drivetrain::error::ConfigError>(())
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SwerveSteering<const N: usize>([Module; N]);
-
 /// Memory of one module.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Module {
@@ -92,23 +72,13 @@ struct Module {
     reversed: bool,
 }
 
-impl<const N: usize> SwerveSteering<N> {
-    /// Makes an empty memory: a module without a command holds its first measured angle.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self([Module { target_rad: 0.0, has_target: false, reversed: false }; N])
-    }
-}
-
-impl<const N: usize> Default for SwerveSteering<N> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 /// Turns wanted states into states that the motors of the modules can follow.
 impl<const N: usize> Swerve<N> {
     /// Returns the target of each module, from the wanted states and the measured angles.
+    ///
+    /// `memory` has for each module its commanded angle, and whether its drive is reversed. [`Chassis`](super::Chassis) keeps this memory;
+    /// without a chassis, keep it beside the layout for [`steer`](Self::steer) and [`lock`](Self::lock), and begin with `None`
+    /// when the motors were relaxed: a module without a memory and a command holds its first measured angle.
     ///
     /// * A module turns by at most 90 degrees and the hysteresis; if the opposite direction is nearer, its drive reverses.
     ///   The hysteresis keeps a command at 90 degrees from flipping the module to and fro.
@@ -122,26 +92,30 @@ impl<const N: usize> Swerve<N> {
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::{chassis::{ModuleState, Swerve, SwerveSteering}, geometry::{Twist, Vec2}, units::Angle};
+    /// use drivetrain::{chassis::Swerve, geometry::{Twist, Vec2}, units::Angle};
     ///
     /// let swerve = Swerve::new(0.1, [Vec2::new(0.3, 0.0), Vec2::new(-0.3, 0.0)])?;
-    /// let mut steering = SwerveSteering::new();
+    /// let mut memory = [None; 2];
     /// let back = swerve.inverse(Twist::new(-1.0, 0.1763, 0.0)); // 170 degrees
-    /// let [front, _] = swerve.steer(&mut steering, back, [Some(Angle::ZERO); 2]);
+    /// let [front, _] = swerve.steer(&mut memory, back, [Some(Angle::ZERO); 2]);
     /// assert!((front.angle.as_degrees() + 10.0).abs() < 0.3); // 10 degrees to the right, drive reversed
     /// assert!((front.velocity.as_rad_per_s() + 10.0).abs() < 0.01); // 10.15 rad/s times cos(10 degrees)
+    /// let [front, _] = swerve.steer(&mut memory, [drivetrain::chassis::ModuleState::default(); 2], [Some(Angle::from_degrees(-4.0)); 2]);
+    /// assert!((front.angle.as_degrees() + 10.0).abs() < 0.3); // told to stand, a module keeps its angle
     /// # Ok::<(), drivetrain::error::ConfigError>(())
     /// ```
     pub fn steer(
         &self,
-        steering: &mut SwerveSteering<N>,
+        memory: &mut [Option<(Angle, bool)>; N],
         wanted: [ModuleState; N],
         measured: [Option<Angle>; N],
     ) -> [ModuleState; N] {
         let config = self.steering;
         let mut inputs = wanted.into_iter().zip(measured);
-        steering.0.each_mut().map(|module| match inputs.next() {
-            Some((wanted, measured)) => module.steer(config, wanted, measured),
+        memory.each_mut().map(|memory| match inputs.next() {
+            Some((wanted, measured)) => {
+                Module::with(memory, |module| module.steer(config, wanted, measured))
+            }
             None => ModuleState::default(),
         })
     }
@@ -152,19 +126,35 @@ impl<const N: usize> Swerve<N> {
     /// A module at the origin has no such direction, and holds its angle.
     pub fn lock(
         &self,
-        steering: &mut SwerveSteering<N>,
+        memory: &mut [Option<(Angle, bool)>; N],
         measured: [Option<Angle>; N],
     ) -> [ModuleState; N] {
         let config = self.steering;
         let mut inputs = self.positions_m().iter().zip(measured);
-        steering.0.each_mut().map(|module| match inputs.next() {
-            Some((&position, measured)) => module.lock(config, position, measured),
+        memory.each_mut().map(|memory| match inputs.next() {
+            Some((&position, measured)) => {
+                Module::with(memory, |module| module.lock(config, position, measured))
+            }
             None => ModuleState::default(),
         })
     }
 }
 
 impl Module {
+    /// Acts on a module by its memory: the commanded angle, and whether the drive is reversed.
+    fn with(
+        memory: &mut Option<(Angle, bool)>,
+        act: impl FnOnce(&mut Self) -> ModuleState,
+    ) -> ModuleState {
+        let (target, reversed) = memory.unwrap_or((Angle::ZERO, false));
+        let has_target = memory.is_some();
+        let mut module = Self { target_rad: target.as_radians(), has_target, reversed };
+        let state = act(&mut module);
+        let Self { target_rad, has_target, reversed } = module;
+        *memory = has_target.then_some((Angle::from_radians(target_rad), reversed));
+        state
+    }
+
     fn steer(
         &mut self,
         config: Steering,
@@ -255,12 +245,12 @@ mod tests {
     /// One module and its memory.
     struct One {
         swerve: Swerve<2>,
-        steering: SwerveSteering<2>,
+        steering: [Option<(Angle, bool)>; 2],
     }
 
     impl One {
         fn new(swerve: Swerve<2>) -> Self {
-            Self { swerve, steering: SwerveSteering::new() }
+            Self { swerve, steering: [None; 2] }
         }
 
         fn steer(&mut self, wanted: ModuleState, measured: Option<f32>) -> (f32, f32) {
@@ -436,7 +426,7 @@ mod tests {
     fn a_module_at_the_centre_holds_its_angle_in_the_lock() {
         let swerve = Swerve::new(0.05, [Vec2::ZERO, Vec2::new(0.3, 0.0)]).unwrap();
         let measured = [Some(Angle::from_degrees(70.0)); 2];
-        let [centre, _] = swerve.lock(&mut SwerveSteering::new(), measured);
+        let [centre, _] = swerve.lock(&mut [None; 2], measured);
         assert!((centre.angle.as_degrees() - 70.0).abs() < 1e-3);
     }
 

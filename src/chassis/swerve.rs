@@ -1,7 +1,7 @@
 use super::kinematics::{Normal, Row, fit};
 use super::omni::zip_arrays;
 use super::steering::Steering;
-use super::{Kinematics, SwerveSteering, WheelSpeed, positive};
+use super::{Kinematics, WheelSpeed, positive};
 use crate::error::ConfigError;
 use crate::geometry::{Body, Rotation2, Twist, Vec2};
 use crate::math::atan2;
@@ -154,9 +154,10 @@ impl<const N: usize> Swerve<N> {
 impl<const N: usize> Kinematics for Swerve<N> {
     type Wheels<T: Copy> = [T; N];
     type Speed = ModuleState;
-    type Steering = SwerveSteering<N>;
+    /// The commanded angle of each module, and whether its drive is reversed; `None` before its first measured angle.
+    type Steering = [Option<(Angle, bool)>; N];
 
-    const UNSTEERED: SwerveSteering<N> = SwerveSteering::new();
+    const UNSTEERED: Self::Steering = [None; N];
 
     fn inverse(&self, twist: Twist<Body>) -> [ModuleState; N] {
         self.inverse(twist)
@@ -179,7 +180,7 @@ impl<const N: usize> Kinematics for Swerve<N> {
 
     fn steer(
         &self,
-        steering: &mut SwerveSteering<N>,
+        steering: &mut Self::Steering,
         wanted: [ModuleState; N],
         measured: [Option<ModuleState>; N],
     ) -> [ModuleState; N] {
@@ -188,7 +189,7 @@ impl<const N: usize> Kinematics for Swerve<N> {
 
     fn lock(
         &self,
-        steering: &mut SwerveSteering<N>,
+        steering: &mut Self::Steering,
         measured: [Option<ModuleState>; N],
     ) -> [ModuleState; N] {
         self.lock(steering, angles(measured))

@@ -23,7 +23,6 @@ pub fn call_all() {
     Swerve::<4>::with_hysteresis.call();
     Swerve::<4>::with_hold_below.call();
     Swerve::<4>::without_cosine_compensation.call();
-    SwerveSteering::<4>::new.call();
     ModuleState::new.call();
     <AngularVelocity as WheelSpeed>::is_finite.call();
     <ModuleState as WheelSpeed>::is_finite.call();

@@ -6,7 +6,7 @@ use crate::wiring::{Drive, START, Targets};
 use core::hint::black_box;
 use drivetrain::chassis::{
     Chassis, ChassisLimits, ChassisMode, Mecanum, MecanumWheels, ModeConfig, Modes, ModuleState,
-    Omni, PowerModel, Swerve, SwerveSteering, WheelLoad,
+    Omni, PowerModel, Swerve, WheelLoad,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Handle, M3508};
@@ -69,7 +69,7 @@ fn robot_swerve_forward(swerve: &Swerve<4>, modules: &Modules) -> Twist<Body> {
 #[inline(never)]
 fn robot_steer(
     swerve: &Swerve<4>,
-    memory: &mut SwerveSteering<4>,
+    memory: &mut [Option<(Angle, bool)>; 4],
     wanted: &Modules,
     angles: &[Option<Angle>; 4],
 ) -> Modules {
@@ -154,9 +154,9 @@ fn kinematics() {
         _ = black_box(f(&swerve, &modules));
     });
     row("swerve_forward", &[forward]);
-    let mut memory = SwerveSteering::new();
+    let mut memory = [None; 4];
     let angles = modules.map(|module| Some(module.angle));
-    let function = robot_steer as fn(&_, &mut SwerveSteering<4>, &Modules, &[_; 4]) -> Modules;
+    let function = robot_steer as fn(&_, &mut [Option<(Angle, bool)>; 4], &Modules, &[_; 4]) -> Modules;
     let steer = instructions(function, |f, call| {
         let wanted = swerve.inverse(motion(call));
         _ = black_box(f(&swerve, &mut memory, &wanted, &angles));
