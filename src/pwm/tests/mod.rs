@@ -3,7 +3,8 @@
 use super::*;
 use crate::control::PidConfig;
 use crate::motor::{
-    ArmError, Capability, Condition, HealthConfig, Link, Reaction, TargetError, VelocityDrive,
+    ArmError, Capability, Condition, HealthConfig, Link, OneOf, Reaction, TargetError,
+    VelocityDrive,
 };
 use crate::time::{Duration, Instant, Tick};
 use crate::units::AngularVelocity;
