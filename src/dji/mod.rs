@@ -36,18 +36,18 @@
 //! `attach` is a `const fn`: in a `const` the same refusal is a compile error, in words.
 //!
 //! ```compile_fail
-//! use drivetrain::dji::{Bus, Config, Gm6020Current, M3508};
+//! use drivetrain::dji::{AttachError, Bus, Config, Gm6020Current, M3508};
 //!
 //! const BUS: Bus = {
 //!     let mut bus = Bus::new();
 //!     match bus.attach(Config::<M3508>::new(5)) {
 //!         Ok(_) => {}
-//!         Err(error) => panic!("{}", error.message().as_str()),
+//!         Err(error) => panic!("{}", error.message(&mut [0; AttachError::LONGEST])),
 //!     }
 //!     match bus.attach(Config::<Gm6020Current>::new(1)) {
 //!         Ok(_) => {}
 //!         // error[E0080]: evaluation panicked: GM6020 (current) #1 collides with M3508 #5 on 0x205
-//!         Err(error) => panic!("{}", error.message().as_str()),
+//!         Err(error) => panic!("{}", error.message(&mut [0; AttachError::LONGEST])),
 //!     }
 //!     bus
 //! };
@@ -62,17 +62,17 @@
 //! The example above with a free id for the GM6020 compiles:
 //!
 //! ```
-//! use drivetrain::dji::{Bus, Config, Gm6020Current, M3508};
+//! use drivetrain::dji::{AttachError, Bus, Config, Gm6020Current, M3508};
 //!
 //! const BUS: Bus = {
 //!     let mut bus = Bus::new();
 //!     match bus.attach(Config::<M3508>::new(5)) {
 //!         Ok(_) => {}
-//!         Err(error) => panic!("{}", error.message().as_str()),
+//!         Err(error) => panic!("{}", error.message(&mut [0; AttachError::LONGEST])),
 //!     }
 //!     match bus.attach(Config::<Gm6020Current>::new(2)) {
 //!         Ok(_) => {}
-//!         Err(error) => panic!("{}", error.message().as_str()),
+//!         Err(error) => panic!("{}", error.message(&mut [0; AttachError::LONGEST])),
 //!     }
 //!     bus
 //! };
@@ -186,7 +186,7 @@ mod watch;
 pub use bus::Bus;
 pub use codec::{ErrorCode, Feedback, State};
 pub use config::{Config, WordGains};
-pub use error::{AttachError, Message};
+pub use error::AttachError;
 pub use model::{Facts, Gm6020Current, Gm6020Voltage, M2006, M3508, Model};
 pub use motors::{AnyHandle, Handle};
 use outbox::CommandFrame;

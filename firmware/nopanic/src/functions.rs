@@ -5,7 +5,7 @@ use core::hint::black_box;
 use drivetrain::control::{Differentiator, Pid, PidConfig, WheelTuning, fhan};
 use drivetrain::dji::{
     AnyHandle, AttachError, Bus, Config, Facts, Feedback, Gm6020Current, Gm6020Voltage, Handle,
-    M2006, M3508, Message, WordGains,
+    M2006, M3508, WordGains,
 };
 use drivetrain::encoder::{GearRatio, Homing, Position, Shaft, resolve_gap, shortest};
 use drivetrain::error::ConfigError;
@@ -399,7 +399,6 @@ fn dji() {
     Facts::of_word.call();
     Facts::place.call();
     AttachError::message.call();
-    Message::as_str.call();
     Config::<M3508>::new.call();
     Config::<M3508>::reversed.call();
     Config::<M3508>::speed_loop.call();
