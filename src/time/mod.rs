@@ -33,7 +33,7 @@ pub use ticker::{Tick, Ticker, TimeStep};
 /// |---|---|---|
 /// | a device, such as [`Bus::next_edge`](crate::dji::Bus::next_edge) | [`Condition`](crate::motor::Condition) | [`MotorName`](crate::motor::MotorName) |
 /// | [`Runner::next_edge`](crate::runner::Runner::next_edge) | [`BusCondition`](crate::runner::BusCondition) | `()` |
-/// | a receiver, such as [`Dbus::edge`](crate::wire::dbus::Dbus::edge) | [`Silence`](crate::wire::Silence) | `()` |
+/// | a receiver, such as [`Dbus::edge`](crate::wire::dbus::Dbus::edge) | the text `"silence"`, its only condition | `()` |
 ///
 /// An edge is latched until read, and read once. While an edge waits, the same change is not latched again: an error of a motor that comes
 /// and goes at 1 kHz is one edge. The last edge read of a bus or of a receiver tells the present state.
