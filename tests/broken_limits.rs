@@ -8,7 +8,7 @@ mod own;
 
 use drivetrain::chassis::{
     Chassis, ChassisLimits, Differential, Kinematics, ModeConfig, Modes, Omni, PowerBuffer,
-    PowerFit, PowerModel, Swerve, WheelLoad,
+    PowerFit, PowerModel, Swerve,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, M3508};
@@ -34,8 +34,8 @@ fn model() -> PowerModel {
     PowerModel::new(1.0, 0.475, 0.065, 0.001).unwrap()
 }
 
-fn load(torque: f32, speed_rad_s: f32) -> WheelLoad {
-    WheelLoad { torque, speed_rad_s }
+fn load(torque: f32, speed_rad_s: f32) -> (f32, AngularVelocity) {
+    (torque, AngularVelocity::from_rad_per_s(speed_rad_s))
 }
 
 // With a NaN limit taken as no limit, every other test passed: the motors would have had all the power there is.
@@ -350,9 +350,11 @@ fn words_under(limit_w: f32) -> [i16; 4] {
         let limit_w = if ms == 399 { limit_w } else { 1e6 };
         runner.port_mut().0.0.clear();
         runner.tick_limited(tick, |bus| {
-            let loads = wheels.map(|wheel| WheelLoad {
-                torque: bus.commanded_current(wheel).unwrap().as_amperes(),
-                speed_rad_s: bus.state(wheel).unwrap().velocity.as_rad_per_s(),
+            let loads = wheels.map(|wheel| {
+                (
+                    bus.commanded_current(wheel).unwrap().as_amperes(),
+                    bus.state(wheel).unwrap().velocity,
+                )
             });
             let (scale, _) = model().cut(loads, limit_w);
             bus.scale_outputs(wheels, scale);

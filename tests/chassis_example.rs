@@ -256,7 +256,7 @@ fn the_power_limit_binds_and_the_buffer_stays_above_its_reserve() {
     let lowest = outcome.samples.iter().map(|sample| sample.buffer_j).fold(60.0, f32::min);
     assert!((18.0..30.0).contains(&lowest), "{lowest} J");
     // The simulated winding has 0.065 ohm; the fit starts from 0.1.
-    let load = drivetrain::chassis::WheelLoad { torque: 10.0, speed_rad_s: 0.0 };
+    let load = (10.0, drivetrain::units::AngularVelocity::ZERO);
     let heat = outcome.fitted.power_w(load);
     assert!((heat - 6.5).abs() < 0.7, "{heat} W, {:?}", outcome.fitted);
 }

@@ -5,7 +5,7 @@ use super::scenario::{
 };
 use drivetrain::chassis::{
     Chassis, ChassisLimits, ChassisMode, Mecanum, MecanumWheels, ModeConfig, Modes, PowerBuffer,
-    PowerFit, PowerModel, WheelLoad,
+    PowerFit, PowerModel,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::dji::Bus;
@@ -204,15 +204,14 @@ impl Limiter {
     fn limit(&mut self, bus: &mut Bus, wheels: Wheels, measured_w: f32, dt_s: f32) {
         self.energy_j = (self.energy_j + (self.limit_w - measured_w) * dt_s).clamp(0.0, BUFFER_J);
         let states = wheels.map(|wheel| bus.state(wheel));
-        let loads = wheels.zip(states).map(|(wheel, state)| WheelLoad {
-            torque: bus.commanded_current(wheel).map_or(0.0, |current| current.as_amperes()),
-            speed_rad_s: state.map_or(0.0, |state| state.velocity.as_rad_per_s()),
+        let loads = wheels.zip(states).map(|(wheel, state)| {
+            (
+                bus.commanded_current(wheel).map_or(0.0, |current| current.as_amperes()),
+                state.map_or(AngularVelocity::ZERO, |state| state.velocity),
+            )
         });
         if let Some(states) = states.all() {
-            let present = states.map(|state| WheelLoad {
-                torque: state.current.as_amperes(),
-                speed_rad_s: state.velocity.as_rad_per_s(),
-            });
+            let present = states.map(|state| (state.current.as_amperes(), state.velocity));
             self.fit.learn(present, measured_w);
         }
         let allowed_w = self.buffer.allowance_w(self.limit_w, Some(self.energy_j), dt_s);

@@ -98,7 +98,7 @@ pub use mecanum::{Mecanum, MecanumWheels};
 pub use mode::{ChassisMode, ModeConfig, Modes};
 pub use odometry::Odometry;
 pub use omni::{Differential, Omni};
-pub use power::{PowerFit, PowerModel, WheelLoad};
+pub use power::{PowerFit, PowerModel};
 pub use power_buffer::{CapacitorPlan, PowerBuffer};
 pub use swerve::{ModuleState, Swerve};
 

@@ -130,11 +130,11 @@
 //! [`Bus::scale_outputs`] scales the commands of an update by one factor, for instance to keep a power limit:
 //!
 //! ```
-//! use drivetrain::chassis::{PowerModel, WheelLoad};
+//! use drivetrain::chassis::PowerModel;
 //! use drivetrain::dji::{Bus, Config, M3508};
 //! use drivetrain::frame::CanFrame;
 //! use drivetrain::time::{Duration, Instant, Tick};
-//! use drivetrain::units::Current;
+//! use drivetrain::units::{AngularVelocity, Current};
 //!
 //! let mut bus = Bus::new();
 //! let at_once = |id| Config::<M3508>::new(id).with_opening(Duration::ZERO); // for one update
@@ -151,9 +151,9 @@
 //! bus.update(Tick::new(now, 0.001));
 //!
 //! let model = PowerModel::new(0.0, 0.475, 0.065, 0.0)?; // of current and speed
-//! let loads = wheels.map(|wheel| WheelLoad {
-//!     torque: bus.commanded_current(wheel).map_or(0.0, |current| current.as_amperes()),
-//!     speed_rad_s: bus.state(wheel).map_or(0.0, |state| state.velocity.as_rad_per_s()),
+//! let loads = wheels.map(|wheel| {
+//!     let current = bus.commanded_current(wheel).map_or(0.0, |current| current.as_amperes());
+//!     (current, bus.state(wheel).map_or(AngularVelocity::ZERO, |state| state.velocity))
 //! });
 //! let (scale, _) = model.cut(loads, 60.0); // both together would take 112 W
 //! bus.scale_outputs(wheels, scale);

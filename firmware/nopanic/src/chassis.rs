@@ -110,7 +110,7 @@ pub fn call_all() {
     Odometry::set_gyro_offset.call();
     PowerModel::new.call();
     PowerModel::power_w.call();
-    (|model: &PowerModel, wheels: [WheelLoad; 4], limit_w: f32| {
+    (|model: &PowerModel, wheels: [(f32, AngularVelocity); 4], limit_w: f32| {
         PowerModel::cut(model, wheels, limit_w)
     })
     .call();
@@ -123,7 +123,7 @@ pub fn call_all() {
     PowerFit::new.call();
     PowerFit::model.call();
     PowerFit::rejected.call();
-    (|fit: &mut PowerFit, wheels: [WheelLoad; 4], watts: f32| PowerFit::learn(fit, wheels, watts))
+    (|fit: &mut PowerFit, wheels: [(f32, AngularVelocity); 4], watts: f32| PowerFit::learn(fit, wheels, watts))
         .call();
     wheels!(MecanumWheels);
 }
