@@ -12,6 +12,7 @@ use drivetrain::motor::VelocityDrive;
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{ChassisConfig, Controller, MotorConfig, MotorKey, Simulation, Wheel};
 use drivetrain::time::{Duration, Instant};
+use drivetrain::units::AngularVelocity;
 use drivetrain::wire::referee::{Referee, encode};
 use drivetrain::wire::supercap::hkust;
 
