@@ -200,7 +200,7 @@ pub(crate) fn run(has_burst: bool, lost: Lost) -> Result<Vec<Sample>, Box<dyn Er
         runner.tick_limited(tick, |bus| limiter.limit(bus, wheels));
         samples.push(Sample {
             time_s,
-            speed_m_s: world.chassis().ok_or("no chassis")?.twist.linear().norm(),
+            speed_m_s: world.chassis().ok_or("no chassis")?.1.linear().norm(),
             chassis_w: supply.chassis_w,
             supply_w: supply.supply_w,
             allowed_w: limiter.allowed_w,

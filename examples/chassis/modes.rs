@@ -82,9 +82,9 @@ impl Drive {
             // This robot arms by itself, which only a simulated one may.
             let _not_yet = robot.is_armed() || robot.arm(tick).is_ok();
             let time_s = seconds_of(tick.now());
-            let truth = world.chassis().ok_or("no chassis")?;
+            let (pose, twist) = world.chassis().ok_or("no chassis")?;
             let gimbal = gimbal(time_s, self.seconds);
-            let yaw = gimbal - Angle::from_radians(narrow(truth.heading_rad));
+            let yaw = gimbal - pose.angle;
 
             modes.set_mode(self.mode_at(time_s));
             match modes.update(stick(time_s, self.seconds), Some(yaw), tick.dt_s()) {
@@ -107,11 +107,11 @@ impl Drive {
             outcome.samples.push(Sample {
                 time_s,
                 acting: modes.acting(),
-                position_m: (narrow(truth.x_m), narrow(truth.y_m)),
-                heading_deg: narrow(truth.heading_rad.to_degrees()),
+                position_m: (pose.x_m, pose.y_m),
+                heading_deg: pose.angle.as_degrees(),
                 gimbal_deg: gimbal.as_degrees(),
-                wz_rad_s: truth.twist.wz_rad_s,
-                speed_m_s: truth.twist.linear().norm(),
+                wz_rad_s: twist.wz_rad_s,
+                speed_m_s: twist.linear().norm(),
                 wheel_rpm: wheels.map(rpm),
                 power_w,
                 buffer_j: limiter.as_ref().map_or(BUFFER_J, |limiter| limiter.energy_j),

@@ -21,7 +21,7 @@
 //! | [`MotorConfig`] | a motor to attach; a joint of a snake robot needs no configuration: [`Simulation::attach_joint`] |
 //! | [`MotorKey`], [`MotorState`] | an attached motor or joint, and its true state |
 //! | [`Drive`], [`DamiaoDrive`], [`RobStrideDrive`], [`LkDrive`], [`RmdDrive`], [`VescDrive`], [`OdriveDrive`] | a drive of another family, put on a bus by [`Simulation::advance_drives`] |
-//! | [`ChassisConfig`], [`Wheel`], [`ChassisState`] | a body on wheels of any layout, and its true state |
+//! | [`ChassisConfig`], [`Wheel`] | a body on wheels of any layout |
 //! | [`SerialLine`] | a serial line that takes its time, and damages bytes |
 //! | [`Controller`] | the driver's end of a bus |
 //! | [`Fault`] | a fault and its window of time |
@@ -87,6 +87,7 @@ mod port;
 mod rotor;
 
 use crate::frame::CanFrame;
+use crate::geometry::{Body, Pose2, Twist, World};
 use crate::time::{Clock, Duration, Instant};
 use chassis::Chassis;
 use core::cell::RefCell;
@@ -96,7 +97,7 @@ use joint::JointConfig;
 use motor::{JOINTS, MOTORS};
 
 pub use can::{INTERMISSION_BITS, frame_bits, nominal_bits, worst_case_bits};
-pub use chassis::{ChassisConfig, ChassisState, Wheel};
+pub use chassis::{ChassisConfig, Wheel};
 pub use drive::{
     DamiaoDrive, Drive, DriveShaft, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive,
 };
@@ -298,9 +299,10 @@ impl Simulation {
         Ok(())
     }
 
-    /// Returns the true state of the chassis; `None` without a chassis.
+    /// Returns the true pose and motion of the chassis, its angle not reduced to one turn; `None` without a chassis. A chassis starts at
+    /// the origin, facing along x.
     #[must_use]
-    pub fn chassis(&self) -> Option<ChassisState> {
+    pub fn chassis(&self) -> Option<(Pose2<World>, Twist<Body>)> {
         self.with(|engine| engine.chassis.as_ref().map(Chassis::state))
     }
 
