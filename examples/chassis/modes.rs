@@ -1,7 +1,7 @@
 //! The same robot under a gimbal and a pilot: what each mode makes of the same stick, and what a power limit leaves.
 
 use super::scenario::{
-    FRONT_LEFT_M, Robot, WHEEL_RADIUS_M, Wheels, at, attach_motors, narrow, robot, seconds_of,
+    FRONT_LEFT_M, Robot, WHEEL_RADIUS_M, Wheels, at, attach_motors, robot, seconds_of,
 };
 use drivetrain::chassis::{
     Chassis, ChassisLimits, ChassisMode, Mecanum, MecanumWheels, ModeConfig, Modes, PowerBuffer,

@@ -13,7 +13,7 @@ use drivetrain::sim::{
     Transmission, Wheel,
 };
 use drivetrain::time::{Duration, Instant, Tick};
-use drivetrain::units::{Angle, AngularVelocity};
+use drivetrain::units::AngularVelocity;
 use drivetrain::wire::Counts;
 use std::error::Error;
 
@@ -260,11 +260,6 @@ fn observe(
 /// Stands for the IMU.
 fn heading(world: &Simulation) -> Heading {
     world.chassis().map_or(Heading::ZERO, |(pose, _)| pose.heading())
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "some metres or radians")]
-pub(crate) fn narrow(value: f64) -> f32 {
-    value as f32
 }
 
 fn share_of_error(sample: &Sample) -> f32 {

@@ -21,7 +21,7 @@ fn pilot(ms: u64) -> Remote {
 }
 
 /// Drives for 3 s. Returns the largest speed and the way, in m/s and m.
-fn drive() -> Result<(f32, f64), Box<dyn Error>> {
+fn drive() -> Result<(f32, f32), Box<dyn Error>> {
     let world = Simulation::new(1);
     let wheel = |id, y| -> Result<Wheel, Box<dyn Error>> {
         let wheel =
