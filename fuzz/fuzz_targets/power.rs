@@ -20,7 +20,9 @@ fuzz_target!(|data: &[u8]| {
     // I9 and I10: a copy that starts anew wherever the loop does.
     let (mut buffer, mut clean) = (fresh, fresh);
     while !input.is_empty() {
-        let loads: [(f32, AngularVelocity); 4] = core::array::from_fn(|_| (input.float(), AngularVelocity::from_rad_per_s(input.float())));
+        let loads: [(f32, AngularVelocity); 4] = core::array::from_fn(|_| {
+            (input.float(), AngularVelocity::from_rad_per_s(input.float()))
+        });
         let limit_w = input.float();
         cut(&model, loads, limit_w);
         let before = fit;
@@ -56,10 +58,8 @@ fn cut(model: &PowerModel, loads: [(f32, AngularVelocity); 4], limit_w: f32) {
         |load: &(f32, AngularVelocity), torque: f32| f64::from(model.power_w((torque, load.1)));
     let idle: f64 = loads.iter().map(|load| power(load, 0.0)).sum();
     let cut_w: f64 = loads.iter().map(|load| power(load, load.0 * scale)).sum();
-    let size: f64 = loads
-        .iter()
-        .map(|load| power(load, load.0).abs() + power(load, -load.0).abs())
-        .sum();
+    let size: f64 =
+        loads.iter().map(|load| power(load, load.0).abs() + power(load, -load.0).abs()).sum();
     if power_w <= limit && cut_w.is_finite() && size.is_finite() && size < 1e30 {
         // A torque that is cut has no smaller step than this.
         let smallest = f32::from_bits(1);

@@ -4,11 +4,11 @@
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{ArmError, CanDevice, Devices};
 use drivetrain::runner::{EmergencyStop, Nb, Runner};
-use std::cell::Cell;
 use drivetrain::time::{Instant, Tick};
 use drivetrain_fuzz::{Clock, Gesture, Input, Watched};
 use embedded_can::ErrorKind;
 use libfuzzer_sys::fuzz_target;
+use std::cell::Cell;
 
 const KINDS: [ErrorKind; 7] = [
     ErrorKind::Overrun,

@@ -1,6 +1,6 @@
 //! Clocks: the trait, also of a cell set by hand, and the extension of a hardware counter.
 
-use super::{Duration, Instant};
+use super::Instant;
 use crate::error::ConfigError;
 use core::cell::Cell;
 use core::num::NonZeroU32;
@@ -61,7 +61,7 @@ impl Clock for &Cell<Instant> {
 #[cfg(feature = "std")]
 impl Clock for std::time::Instant {
     fn now(&mut self) -> Instant {
-        Instant::START + Duration::from(self.elapsed())
+        Instant::START + super::Duration::from(self.elapsed())
     }
 }
 

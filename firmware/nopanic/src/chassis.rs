@@ -123,8 +123,10 @@ pub fn call_all() {
     PowerFit::new.call();
     PowerFit::model.call();
     PowerFit::rejected.call();
-    (|fit: &mut PowerFit, wheels: [(f32, AngularVelocity); 4], watts: f32| PowerFit::learn(fit, wheels, watts))
-        .call();
+    (|fit: &mut PowerFit, wheels: [(f32, AngularVelocity); 4], watts: f32| {
+        PowerFit::learn(fit, wheels, watts)
+    })
+    .call();
     wheels!(MecanumWheels);
 }
 

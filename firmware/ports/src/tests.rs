@@ -1,13 +1,13 @@
 //! Both drivers of the MCP2515 on a chip of 128 registers, by its data sheet (DS20001801, chapter 12).
 
 use super::{Interface, Mcp25xx, Mcp2515};
+use core::cell::Cell;
 use core::pin::pin;
 use core::task::{Context, Poll, Waker};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, M3508};
 use drivetrain::frame::CanFrame;
 use drivetrain::runner::{AbortPending, Nb, NbAbort, Runner};
-use core::cell::Cell;
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::Current;
 use embedded_can::Frame;

@@ -156,7 +156,8 @@ fn kinematics() {
     row("swerve_forward", &[forward]);
     let mut memory = [None; 4];
     let angles = modules.map(|module| Some(module.angle));
-    let function = robot_steer as fn(&_, &mut [Option<(Angle, bool)>; 4], &Modules, &[_; 4]) -> Modules;
+    let function =
+        robot_steer as fn(&_, &mut [Option<(Angle, bool)>; 4], &Modules, &[_; 4]) -> Modules;
     let steer = instructions(function, |f, call| {
         let wanted = swerve.inverse(motion(call));
         _ = black_box(f(&swerve, &mut memory, &wanted, &angles));
