@@ -210,7 +210,7 @@ fn look(
     drives: &Drives,
     (pitch, shooter): &mut Turret,
 ) -> Result<(), Box<dyn Error>> {
-    let truth = world.chassis().ok_or("no chassis")?.twist;
+    let (_, truth) = world.chassis().ok_or("no chassis")?;
     let (pitch_shaft, wheel) = (drives.pitch.shaft(), drives.shooter.shaft());
     let rpm = AngularVelocity::from_rad_per_s(wheel.velocity_rad_per_s()).as_rpm();
     if (1_500..STOPPED).contains(&ms) {

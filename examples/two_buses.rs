@@ -164,7 +164,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut robot = Robot::new(&world)?;
     let mut gimbal = Gimbal::new(&world, Line::Can3)?;
     let (mut fastest, mut front_relaxed, mut yaw_error) = (0.0_f32, true, 0.0_f32);
-    let (mut hardest, mut before, mut off_m) = (0.0_f32, 0.0_f32, 0.0_f64);
+    let (mut hardest, mut before, mut off_m) = (0.0_f32, 0.0_f32, 0.0_f32);
     let mut edges = Vec::new();
 
     for ms in 0..3_000 {
@@ -176,12 +176,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         edges.extend(robot.rear.edges().map(|edge| ("rear", edge)));
         edges.extend(gimbal.runner.edges().map(|edge| ("gimbal", edge)));
 
-        let truth = world.chassis().ok_or("no chassis")?;
+        let (place, truth) = world.chassis().ok_or("no chassis")?;
         let (pose, status) = (robot.chassis.pose(), robot.chassis.status());
         match ms {
             1_000..1_500 => {
-                fastest = fastest.max(truth.twist.vx_m_s);
-                off_m = (truth.x_m - f64::from(pose.x_m)).hypot(truth.y_m - f64::from(pose.y_m));
+                fastest = fastest.max(truth.vx_m_s);
+                off_m = (place.x_m - pose.x_m).hypot(place.y_m - pose.y_m);
             }
             1_520..1_900 => {
                 let commands = [wheels.front_left, wheels.front_right].map(|key| world.motor(key));
@@ -194,8 +194,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         if ms % 50 == 49 {
             // m/s within 50 ms
-            hardest = hardest.max((truth.twist.linear().norm() - before) * 20.0);
-            before = truth.twist.linear().norm();
+            hardest = hardest.max((truth.linear().norm() - before) * 20.0);
+            before = truth.linear().norm();
         }
         if ms % 250 == 249 {
             let heard = if status.motion_known {
@@ -203,14 +203,14 @@ fn main() -> Result<(), Box<dyn Error>> {
             } else {
                 "a bus is down".into()
             };
-            let (vx_m_s, x_m) = (truth.twist.vx_m_s, truth.x_m);
+            let (vx_m_s, x_m) = (truth.vx_m_s, place.x_m);
             console::line(format_args!(
                 "{:>5} ms   true {vx_m_s:5.2} m/s, x {x_m:4.2} m   odometry {heard}",
                 ms + 1
             ));
         }
     }
-    let back = world.chassis().ok_or("no chassis")?.twist;
+    let (_, back) = world.chassis().ok_or("no chassis")?;
     edges.iter().for_each(|(bus, edge)| console::line(format_args!("{bus}: {edge}")));
     console::line(format_args!(
         "frames sent: {} in front, {} in the rear, {} above; the gimbal stayed within {yaw_error:.2}°",

@@ -8,7 +8,7 @@ mod own;
 
 use drivetrain::chassis::{
     Chassis, ChassisLimits, Differential, Kinematics, ModeConfig, Modes, Omni, PowerBuffer,
-    PowerFit, PowerModel, Swerve, WheelLoad,
+    PowerFit, PowerModel, Swerve,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, M3508};
@@ -19,10 +19,11 @@ use drivetrain::motor::{HealthConfig, Ingest, TargetError};
 #[cfg(feature = "hal")]
 use drivetrain::pwm::BrushedConfig;
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::time::{Duration, Instant, ManualClock, Tick};
+use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity, Current, Voltage};
 use embedded_can::ErrorKind;
 use proptest::prelude::*;
+use std::cell::Cell;
 
 /// Limits that are none, and count as zero where there is no way to refuse them.
 const BROKEN: [f32; 4] = [f32::NAN, -f32::NAN, f32::NEG_INFINITY, -80.0];
@@ -33,8 +34,8 @@ fn model() -> PowerModel {
     PowerModel::new(1.0, 0.475, 0.065, 0.001).unwrap()
 }
 
-fn load(torque: f32, speed_rad_s: f32) -> WheelLoad {
-    WheelLoad { torque, speed_rad_s }
+fn load(torque: f32, speed_rad_s: f32) -> (f32, AngularVelocity) {
+    (torque, AngularVelocity::from_rad_per_s(speed_rad_s))
 }
 
 // With a NaN limit taken as no limit, every other test passed: the motors would have had all the power there is.
@@ -268,14 +269,27 @@ fn a_health_configuration_that_makes_no_sense_is_refused() {
 #[cfg(feature = "hal")]
 #[test]
 fn a_motor_on_pins_with_a_limit_that_is_none_is_refused() {
-    use drivetrain::pwm::RcConfig;
+    use drivetrain::pwm::RcPwm;
+    use embedded_hal::pwm::{ErrorType, SetDutyCycle};
+    struct Channel;
+    impl ErrorType for Channel {
+        type Error = core::convert::Infallible;
+    }
+    impl SetDutyCycle for Channel {
+        fn max_duty_cycle(&self) -> u16 {
+            20_000
+        }
+        fn set_duty_cycle(&mut self, _: u16) -> Result<(), Self::Error> {
+            Ok(())
+        }
+    }
     let speed = AngularVelocity::from_rad_per_s;
     let motor = BrushedConfig::new(1).with_encoder(1_320.0, 16);
     for bad in NOT_FINITE.into_iter().chain([0.0, -0.5]) {
         assert!(motor.with_limit(bad).validate().is_err(), "{bad}");
         assert!(motor.with_no_load_speed(speed(bad)).validate().is_err(), "{bad}");
         assert!(motor.with_velocity_filter(bad).validate().is_err() == (bad != 0.0), "{bad}");
-        assert!(RcConfig::new().with_full_speed(speed(bad)).validate().is_err(), "{bad}");
+        assert!(RcPwm::new(Channel).with_full_speed(speed(bad)).is_err(), "{bad}");
     }
     assert!(motor.with_limit(0.5).with_no_load_speed(speed(30.0)).validate().is_ok());
 }
@@ -312,20 +326,20 @@ impl embedded_can::nb::Can for Wire {
 
 /// Four wheels at 100 rpm that are asked for 10 A, under a limit in W that comes from outside; the words of the last tick.
 fn words_under(limit_w: f32) -> [i16; 4] {
-    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let clock = Cell::new(Instant::from_micros(1_000));
     let mut bus = Bus::new();
     let wheels: [Handle<M3508>; 4] =
         bus.attach_all([1, 2, 3, 4].map(Config::<M3508>::new)).unwrap();
     let mut runner = Runner::new(Nb(Wire::default()), &clock, bus);
     for ms in 0..400_u32 {
-        clock.advance(Duration::from_millis(1));
+        clock.set(clock.get() + Duration::from_millis(1));
         for id in 0x201..=0x204 {
             // The angle goes on by what the speed says.
             let [.., a, b] = (ms * 262 % 8_192).to_be_bytes();
             let frame = CanFrame::standard(id, [a, b, 0x07, 0x80, 0, 0, 30, 0]).unwrap();
-            assert_eq!(runner.ingest(&frame, clock.now()), Ingest::Taken);
+            assert_eq!(runner.ingest(&frame, clock.get()), Ingest::Taken);
         }
-        let tick = Tick::new(clock.now(), 0.001);
+        let tick = Tick::new(clock.get(), 0.001);
         if ms == 0 {
             runner.arm(tick).unwrap();
         }
@@ -336,9 +350,11 @@ fn words_under(limit_w: f32) -> [i16; 4] {
         let limit_w = if ms == 399 { limit_w } else { 1e6 };
         runner.port_mut().0.0.clear();
         runner.tick_limited(tick, |bus| {
-            let loads = wheels.map(|wheel| WheelLoad {
-                torque: bus.commanded_current(wheel).unwrap().as_amperes(),
-                speed_rad_s: bus.state(wheel).unwrap().velocity.as_rad_per_s(),
+            let loads = wheels.map(|wheel| {
+                (
+                    bus.commanded_current(wheel).unwrap().as_amperes(),
+                    bus.state(wheel).unwrap().velocity,
+                )
             });
             let (scale, _) = model().cut(loads, limit_w);
             bus.scale_outputs(wheels, scale);

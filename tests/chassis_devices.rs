@@ -3,9 +3,7 @@
 #![cfg(test)]
 #![cfg(feature = "sim")]
 
-use drivetrain::chassis::{
-    Chassis, ChassisLimits, ChassisStatus, Mecanum, MecanumWheels, WheelDrive,
-};
+use drivetrain::chassis::{Chassis, ChassisLimits, ChassisStatus, Mecanum, MecanumWheels};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
 use drivetrain::frame::CanFrame;
@@ -346,7 +344,7 @@ impl OwnMotor for Hub {
 }
 
 /// Drives 0.5 m/s for a second after arming, with hubs that do at once what they are told; returns what they were told last.
-fn drive_hubs<H: Copy, D: Devices + WheelDrive<H, AngularVelocity>>(
+fn drive_hubs<H: Copy, D: Devices + VelocityDrive<H>>(
     device: &mut D,
     wheels: MecanumWheels<H>,
     mut hear: impl FnMut(&mut D, Instant),

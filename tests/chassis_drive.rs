@@ -8,11 +8,9 @@ use drivetrain::chassis::{
 };
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
-use drivetrain::geometry::{Heading, Twist, Vec2};
+use drivetrain::geometry::{Heading, Pose2, Twist, Vec2, World};
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::sim::{
-    ChassisConfig, ChassisState, Controller, Fault, MotorConfig, Simulation, Wheel,
-};
+use drivetrain::sim::{ChassisConfig, Controller, Fault, MotorConfig, Simulation, Wheel};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::Angle;
 
@@ -62,13 +60,12 @@ impl<'w> Robot<'w> {
         Self { world, runner, wheels, chassis }
     }
 
-    fn truth(&self) -> ChassisState {
-        self.world.chassis().unwrap()
+    fn truth(&self) -> Pose2<World> {
+        self.world.chassis().unwrap().0
     }
 
-    #[expect(clippy::cast_possible_truncation, reason = "some radians")]
     fn heading(&self) -> Angle {
-        Angle::from_radians(self.truth().heading_rad as f32)
+        self.truth().angle
     }
 
     fn run(&mut self, seconds: f32, mut command: impl FnMut(&mut Self, Tick)) {
@@ -86,9 +83,9 @@ impl<'w> Robot<'w> {
         }
     }
 
-    fn error_m(&self) -> f64 {
+    fn error_m(&self) -> f32 {
         let (pose, truth) = (self.chassis.pose(), self.truth());
-        (f64::from(pose.x_m) - truth.x_m).hypot(f64::from(pose.y_m) - truth.y_m)
+        (pose.x_m - truth.x_m).hypot(pose.y_m - truth.y_m)
     }
 }
 
@@ -120,7 +117,7 @@ fn the_chassis_follows_its_gimbal() {
             None => robot.chassis.stop(),
         }
     });
-    let degrees = robot.truth().heading_rad.to_degrees();
+    let degrees = robot.truth().angle.as_degrees();
     assert!((degrees - 60.0).abs() < 3.0, "{degrees}");
 }
 

@@ -29,7 +29,6 @@ mod verdict;
 use drivetrain::chassis::ChassisMode;
 
 use drivetrain::wire::Deframer;
-use drivetrain::wire::vofa::JustFloat;
 
 use modes::Drive;
 use scenario::{Run, Sample, Scenario, Trouble};
@@ -226,9 +225,9 @@ fn the_justfloat_stream_reads_back_as_the_samples() {
     let run = run(1, None);
     let bytes = justfloat::stream(&run.samples).unwrap();
     let mut rest = &bytes[..];
-    let mut reader = Deframer::<JustFloat<{ justfloat::CHANNELS }>, 64>::new();
+    let mut reader = Deframer::<[f32; justfloat::CHANNELS], 64>::new();
     for sample in &run.samples {
-        let JustFloat(channels) = reader.read(&mut rest).unwrap();
+        let channels = reader.read(&mut rest).unwrap();
         assert_eq!(&channels[..4], &sample.target_rpm.into_array());
         assert_eq!(&channels[4..], &sample.measured_rpm.into_array());
     }
@@ -257,7 +256,7 @@ fn the_power_limit_binds_and_the_buffer_stays_above_its_reserve() {
     let lowest = outcome.samples.iter().map(|sample| sample.buffer_j).fold(60.0, f32::min);
     assert!((18.0..30.0).contains(&lowest), "{lowest} J");
     // The simulated winding has 0.065 ohm; the fit starts from 0.1.
-    let load = drivetrain::chassis::WheelLoad { torque: 10.0, speed_rad_s: 0.0 };
+    let load = (10.0, drivetrain::units::AngularVelocity::ZERO);
     let heat = outcome.fitted.power_w(load);
     assert!((heat - 6.5).abs() < 0.7, "{heat} W, {:?}", outcome.fitted);
 }

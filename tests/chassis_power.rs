@@ -3,7 +3,7 @@
 #![cfg(test)]
 #![cfg(feature = "sim")]
 
-use drivetrain::chassis::{PowerModel, WheelLoad};
+use drivetrain::chassis::PowerModel;
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{self, Bus, Config, Gm6020Voltage, Handle, M3508};
 use drivetrain::frame::CanFrame;
@@ -92,10 +92,7 @@ proptest! {
         }
         bus.update(Tick::new(now, 0.001));
         let model = PowerModel::new(1.0, 0.475, 0.065, 0.001).unwrap();
-        let loads = |bus: &Bus| motors.map(|motor| WheelLoad {
-            torque: amperes(bus, motor),
-            speed_rad_s: bus.state(motor).unwrap().velocity.as_rad_per_s(),
-        });
+        let loads = |bus: &Bus| motors.map(|motor| (amperes(bus, motor), bus.state(motor).unwrap().velocity));
         let before = loads(&bus);
         let (scale, power_w) = model.cut(before, limit_w);
         bus.scale_outputs(motors, scale);

@@ -4,7 +4,7 @@
 #![cfg(test)]
 
 use core::f32::consts::FRAC_1_SQRT_2;
-use drivetrain::chassis::{Mecanum, MecanumWheels, Omni, PowerModel, WheelLoad};
+use drivetrain::chassis::{Mecanum, MecanumWheels, Omni, PowerModel};
 use drivetrain::geometry::{Heading, Twist, Vec2, World};
 use drivetrain::math::{wrap, wrap_positive};
 use drivetrain::units::{Angle, AngularVelocity};
@@ -98,7 +98,7 @@ fn three_full_sticks_are_slowed_to_the_limit_and_keep_their_direction() {
 #[test]
 fn equal_wheels_stay_equal_through_the_power_limit_whatever_the_others_do() {
     let model = PowerModel::new(1.0, 1.0, 2.0, 0.001).unwrap();
-    let load = |torque, speed_rad_s| WheelLoad { torque, speed_rad_s };
+    let load = |torque, speed_rad_s| (torque, AngularVelocity::from_rad_per_s(speed_rad_s));
     let wheels = MecanumWheels {
         front_left: load(3.0, 40.0),
         front_right: load(3.0, 40.0),
@@ -107,7 +107,7 @@ fn equal_wheels_stay_equal_through_the_power_limit_whatever_the_others_do() {
     };
     for limit_w in [0.0, 30.0, 80.0, 150.0] {
         let (scale, _) = model.cut(wheels, limit_w);
-        let torques = wheels.map(|wheel| wheel.torque * scale);
+        let torques = wheels.map(|(torque, _)| torque * scale);
         assert_eq!(torques.front_left.to_bits(), torques.front_right.to_bits());
         // And the torques keep their proportions, so the pull keeps its direction.
         assert!((torques.rear_left * 3.0 + torques.front_left).abs() < 1e-5, "{torques:?}");

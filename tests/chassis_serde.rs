@@ -6,7 +6,6 @@
 use core::fmt::Debug;
 use drivetrain::chassis::{
     ChassisLimits, ChassisMode, MecanumWheels, ModeConfig, Modes, ModuleState, PowerModel,
-    WheelLoad,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::geometry::{
@@ -77,7 +76,6 @@ fn values_of_the_chassis_survive_a_file() {
     round(MecanumWheels { front_left: 1_u8, front_right: 2, rear_left: 3, rear_right: 4 });
     round(MecanumWheels::splat(speed));
     round(ModuleState::new(speed, Angle::from_degrees(700.0)));
-    round(WheelLoad { torque: -2.0, speed_rad_s: 30.0 });
     round(PowerModel::new(1.0, 0.475, 0.065, 0.001).unwrap());
     round(ChassisLimits::new().with_acceleration(3.0, 20.0).with_wheel_speed(speed.abs()));
     let modes = ModeConfig::new(PidConfig::new(6.0, 0.0, 0.1).with_output_limit(8.0));

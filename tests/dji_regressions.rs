@@ -11,9 +11,10 @@ use drivetrain::motor::{
     TargetError,
 };
 use drivetrain::runner::{EmergencyStop, Nb, Runner};
-use drivetrain::time::{Duration, Edge, Instant, ManualClock, Tick};
+use drivetrain::time::{Duration, Edge, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity, Current, Voltage};
 use embedded_can::ErrorKind;
+use std::cell::Cell;
 
 fn us(micros: u64) -> Instant {
     Instant::from_micros(micros)
@@ -87,7 +88,7 @@ impl embedded_can::nb::Can for Recorder {
 #[test]
 fn the_emergency_stop_reaches_every_part_also_when_one_is_stopped_already() {
     static STOP: EmergencyStop = EmergencyStop::new();
-    let clock = ManualClock::new(us(1_000));
+    let clock = Cell::new(us(1_000));
     let (mut left, mut right) = (Bus::new(), Bus::new());
     left.attach(at_once::<M3508>(1)).unwrap();
     let wheel = right.attach(at_once::<M3508>(5)).unwrap();

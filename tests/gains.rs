@@ -164,7 +164,7 @@ impl Robot<'_> {
             chassis.drive(runner.device_mut(), wheels, tick);
             runner.tick(tick);
             // Of lifted wheels the odometry tells the speed.
-            let twist = world.chassis().map_or(chassis.measured(), |state| state.twist);
+            let twist = world.chassis().map_or(chassis.measured(), |(_, twist)| twist);
             let share = twist.vx_m_s / m_s;
             match ticks {
                 _ if ticks < rest => {}

@@ -3,9 +3,7 @@
 #![cfg(test)]
 #![cfg(feature = "sim")]
 
-use drivetrain::chassis::{
-    CapacitorPlan, Mecanum, MecanumWheels, PowerBuffer, PowerModel, WheelLoad,
-};
+use drivetrain::chassis::{CapacitorPlan, Mecanum, MecanumWheels, PowerBuffer, PowerModel};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
 use drivetrain::frame::CanFrame;
@@ -14,6 +12,7 @@ use drivetrain::motor::VelocityDrive;
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{ChassisConfig, Controller, MotorConfig, MotorKey, Simulation, Wheel};
 use drivetrain::time::{Duration, Instant};
+use drivetrain::units::AngularVelocity;
 use drivetrain::wire::referee::{Referee, encode};
 use drivetrain::wire::supercap::hkust;
 
@@ -201,9 +200,11 @@ impl<'a> Car<'a> {
         let (wheels, model) = (self.wheels.into_array(), self.model);
         _ = self.robot.device_mut().drive(self.wheels.zip(targets).into_array());
         self.robot.tick_limited(tick, |bus| {
-            let loads = wheels.map(|wheel| WheelLoad {
-                torque: bus.commanded_current(wheel).map_or(0.0, |current| current.as_amperes()),
-                speed_rad_s: bus.state(wheel).map_or(0.0, |state| state.velocity.as_rad_per_s()),
+            let loads = wheels.map(|wheel| {
+                (
+                    bus.commanded_current(wheel).map_or(0.0, |current| current.as_amperes()),
+                    bus.state(wheel).map_or(AngularVelocity::ZERO, |state| state.velocity),
+                )
             });
             bus.scale_outputs(wheels, model.cut(loads, allowed_w).0);
         });

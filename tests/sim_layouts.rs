@@ -6,12 +6,10 @@
 use drivetrain::chassis::{Chassis, Differential, Kinematics, ModuleMotors, Omni, Swerve};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, M3508};
-use drivetrain::geometry::{Body, Twist, Vec2};
+use drivetrain::geometry::{Body, Pose2, Twist, Vec2, World};
 use drivetrain::motor::OneOf;
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::sim::{
-    ChassisConfig, ChassisState, Controller, Line, MotorConfig, MotorKey, Simulation, Wheel,
-};
+use drivetrain::sim::{ChassisConfig, Controller, Line, MotorConfig, MotorKey, Simulation, Wheel};
 use drivetrain::time::{Duration, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 
@@ -54,7 +52,7 @@ fn drive<K, const N: usize>(
     wheels: impl Fn([Handle<M3508>; N]) -> K::Wheels<Handle<M3508>>,
     ids: [u8; N],
     motion: Twist<Body>,
-) -> ChassisState
+) -> (Pose2<World>, Twist<Body>)
 where
     K: Kinematics<Speed = AngularVelocity>,
 {
@@ -67,8 +65,8 @@ where
     world.chassis().unwrap()
 }
 
-fn assert_moves(state: ChassisState, wanted: Twist<Body>) {
-    let error = state.twist - wanted;
+fn assert_moves(state: (Pose2<World>, Twist<Body>), wanted: Twist<Body>) {
+    let error = state.1 - wanted;
     assert!(error.linear().norm() < 0.03, "{wanted:?}: {state:?}");
     assert!(error.wz_rad_s.abs() < 0.06, "{wanted:?}: {state:?}");
 }
@@ -148,7 +146,7 @@ impl<'w> Modules<'w> {
     }
 
     /// One second of a motion, or of the lock.
-    fn run(&mut self, motion: Option<Twist<Body>>) -> ChassisState {
+    fn run(&mut self, motion: Option<Twist<Body>>) -> (Pose2<World>, Twist<Body>) {
         let Self { world, drives, steerings, chassis, relaxed } = self;
         let (drives, wheels) = drives;
         let (runner, modules) = steerings;
@@ -193,7 +191,7 @@ fn without_current_locked_modules_hold_against_a_push_and_modules_in_line_roll_a
         modules.relaxed = true;
         let before = modules.run(motion);
         world.push_chassis(0.4 * 20.0 * 9.81, 0.0, 0.0); // the floor holds 0.8 of the weight
-        modules.run(motion).x_m - before.x_m
+        modules.run(motion).0.x_m - before.0.x_m
     };
     let (locked, in_line) = (pushed(None), pushed(Some(Twist::new(0.05, 0.0, 0.0))));
     assert!(locked.abs() < 0.01, "{locked} m");

@@ -6,7 +6,7 @@ use drivetrain::encoder::Position;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{ArmError, Devices, Link, TargetError};
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::sim::{Controller, Fault, JointConfig, Line, MotorKey, Sender, Simulation};
+use drivetrain::sim::{Controller, Fault, Line, MotorKey, Sender, Simulation};
 use drivetrain::snake::{Command, Config, Joint, Joints, Register};
 use drivetrain::time::{Duration, Instant};
 use drivetrain::units::{Angle, AngularVelocity};
@@ -32,15 +32,16 @@ struct Robot<'w> {
 
 impl<'w> Robot<'w> {
     fn new(world: &'w Simulation, count: u8, joints: Joints) -> Self {
-        Self::of(world, (1..=count).map(JointConfig::new), joints)
+        Self::of(world, (1..=count).map(|id| (id, None)), joints)
     }
 
     fn of(
         world: &'w Simulation,
-        configs: impl Iterator<Item = JointConfig>,
+        places: impl Iterator<Item = (u8, Option<i32>)>,
         mut joints: Joints,
     ) -> Self {
-        let keys: Vec<_> = configs.map(|config| world.attach_joint(config).unwrap()).collect();
+        let attached = |(id, pulses)| world.attach_joint(Line::Can1, id, pulses).unwrap();
+        let keys: Vec<_> = places.map(attached).collect();
         let fast = |id| Config::new(id).with_speed(AngularVelocity::from_rpm(30.0));
         let handles = (1..).take(keys.len()).map(|id| joints.attach(fast(id)).unwrap()).collect();
         let runner = Runner::new(Nb(world.controller()), world.clock(), joints);
@@ -241,8 +242,7 @@ fn a_joint_that_is_armed_again_at_once_is_disabled_and_brought_up_anew_whatever_
     ];
     for (position, (what, event, counts, releases)) in events {
         let world = Simulation::new(4);
-        let config = JointConfig::new(1).with_position(position);
-        let mut robot = Robot::of(&world, [config].into_iter(), Joints::new());
+        let mut robot = Robot::of(&world, [(1, Some(position))].into_iter(), Joints::new());
         robot.run(50);
         robot.arm();
         (robot.wanted, robot.is_eager) = (Some(5.0), true);
@@ -282,7 +282,7 @@ fn a_second_controller_shows_in_the_counters() {
 fn a_controller_that_does_not_wait_for_the_answer_collides_with_it() {
     use embedded_can::nb::Can;
     let world = Simulation::new(6);
-    let key = world.attach_joint(JointConfig::new(3)).unwrap();
+    let key = world.attach_joint(Line::Can1, 3, None).unwrap();
     let mut can = world.controller();
     let read = Command::Read(Register::ActualPosition).frame(3).unwrap();
     let write = Command::Write(Register::Position, 5).frame(3).unwrap();

@@ -3,8 +3,7 @@
 #![cfg(test)]
 
 use drivetrain::chassis::{
-    Chassis, ChassisLimits, Kinematics, ModuleMotors, ModuleState, Swerve, SwerveSteering,
-    WheelSpeed,
+    Chassis, ChassisLimits, Kinematics, ModuleMotors, ModuleState, Swerve, WheelSpeed,
 };
 use drivetrain::geometry::{Twist, Vec2};
 use drivetrain::motor::{AngleDrive, TargetError, VelocityDrive};
@@ -34,13 +33,13 @@ fn swerve() -> Swerve<4> {
 /// Four modules that are told the same, and what is remembered of them.
 struct Modules {
     swerve: Swerve<4>,
-    steering: SwerveSteering<4>,
+    steering: [Option<(Angle, bool)>; 4],
 }
 
 impl Modules {
     /// With a hysteresis of 5 degrees, without cosine compensation, nothing remembered.
     fn new() -> Self {
-        Self { swerve: swerve().without_cosine_compensation(), steering: SwerveSteering::new() }
+        Self { swerve: swerve().without_cosine_compensation(), steering: [None; 4] }
     }
 
     /// Reversed, pointing at `here`: told to drive straight back.
@@ -116,7 +115,7 @@ fn the_width_of_the_hysteresis_is_the_same_in_both_directions() {
         for reversed in [false, true] {
             for side in [1.0, -1.0] {
                 let flips_at = (0..1_800_u16).map(|step| f32::from(step) * 0.1).find(|off| {
-                    let mut steering = SwerveSteering::new();
+                    let mut steering = [None; 4];
                     let mut steer = |direction| {
                         let wanted = [module(SPEED, direction); 4];
                         let told = swerve.steer(&mut steering, wanted, [Some(Angle::ZERO); 4]);
@@ -153,7 +152,7 @@ fn standing_and_a_lost_angle_do_not_forget_that_the_drive_is_reversed() {
 #[test]
 fn what_is_remembered_anew_is_not_reversed() {
     let mut modules = Modules::reversed(0.0);
-    modules.steering = SwerveSteering::new();
+    modules.steering = [None; 4];
     let (angle, speed) = modules.steer(93.0, 0.0);
     assert!(near(angle, 93.0) && near(speed, SPEED), "{angle} {speed}");
 }
@@ -189,7 +188,7 @@ fn the_lock_takes_the_direction_that_it_took_before() {
 fn a_reversed_drive_is_compensated_with_the_cosine_of_its_own_error() {
     let swerve = swerve();
     for (direction, here, angle) in [(170.0, 30.0, -10.0), (-170.0, -30.0, 10.0)] {
-        let mut steering = SwerveSteering::new();
+        let mut steering = [None; 4];
         let told =
             swerve.steer(&mut steering, [module(SPEED, direction); 4], [Some(degrees(here)); 4]);
         let (told, speed) = same(told);

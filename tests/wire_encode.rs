@@ -10,7 +10,7 @@ use drivetrain::wire::host_link::{
     COMMAND_LENGTH, HostCommand, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
 };
 use drivetrain::wire::mit;
-use drivetrain::wire::vofa::{JustFloat, justfloat, text_line};
+use drivetrain::wire::vofa::{justfloat, text_line};
 use drivetrain::wire::{Decode, Deframer, EncodeError};
 use proptest::prelude::*;
 
@@ -70,7 +70,7 @@ proptest! {
     #[test]
     fn plotted_values_come_back_but_for_the_last_bit(values: [f32; 4]) {
         let mut buffer = [0; 20];
-        let seen = read::<JustFloat<4>>((), justfloat(&values, &mut buffer).unwrap()).unwrap().0;
+        let seen = read::<[f32; 4]>((), justfloat(&values, &mut buffer).unwrap()).unwrap();
         for (seen, value) in seen.iter().zip(values) {
             prop_assert!(seen.to_bits() ^ value.to_bits() <= 1);
         }

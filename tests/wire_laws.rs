@@ -10,7 +10,7 @@ use drivetrain::wire::host_link::{
     COMMAND_LENGTH, HostCommand, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
 };
 use drivetrain::wire::referee::{self, RefereeMessage};
-use drivetrain::wire::vofa::{JustFloat, justfloat};
+use drivetrain::wire::vofa::justfloat;
 use drivetrain::wire::vt13::{DEAD_BAND, VideoRemote};
 use drivetrain::wire::{Counts, Decode, Deframer};
 use proptest::prelude::*;
@@ -155,7 +155,7 @@ impl Subject for VideoRemote {
     }
 }
 
-impl Subject for JustFloat<3> {
+impl Subject for [f32; 3] {
     fn frame(_: (), seed: u64) -> Vec<u8> {
         let values: Vec<f32> = scramble(seed).take(3).map(|byte| f32::from(byte) - 100.5).collect();
         justfloat(&values, &mut [0; 16]).unwrap().to_vec()
@@ -362,7 +362,7 @@ laws! {
     servo: Status, ();
     referee_system: RefereeMessage, ();
     video_remote: VideoRemote, DEAD_BAND;
-    plot: JustFloat<3>, ();
+    plot: [f32; 3], ();
 }
 
 #[test]

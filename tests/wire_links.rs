@@ -3,22 +3,22 @@
 #![cfg(test)]
 
 use drivetrain::time::{Duration, Edge, Instant};
+use drivetrain::wire::Receiver;
 use drivetrain::wire::dbus::{Dbus, Remote, Switch};
 use drivetrain::wire::hipnuc::{Imu, MAX_FRAME};
 use drivetrain::wire::host_link::{COMMAND_LENGTH, HostCommand, Reset};
-use drivetrain::wire::{Receiver, Silence};
 use proptest::prelude::*;
 
 fn ms(ms: u64) -> Instant {
     Instant::START + Duration::from_millis(ms)
 }
 
-const fn heard(at: Instant) -> Edge<Silence> {
-    Edge { source: (), condition: Silence, began: false, at }
+const fn heard(at: Instant) -> Edge<&'static str> {
+    Edge { source: (), condition: "silence", began: false, at }
 }
 
-const fn lost(at: Instant) -> Edge<Silence> {
-    Edge { source: (), condition: Silence, began: true, at }
+const fn lost(at: Instant) -> Edge<&'static str> {
+    Edge { source: (), condition: "silence", began: true, at }
 }
 
 #[test]

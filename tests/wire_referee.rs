@@ -10,7 +10,7 @@ use drivetrain::wire::dbus::Keys;
 use drivetrain::wire::referee::{MAX_FRAME, Referee, RefereeMessage, encode};
 use drivetrain::wire::supercap::{hkust, pacific_spirit};
 use drivetrain::wire::vt13::{DEAD_BAND, FRAME_LENGTH, ModeSwitch, VideoRemote};
-use drivetrain::wire::{Counts, Decode, Deframer, Receiver, Silence};
+use drivetrain::wire::{Counts, Decode, Deframer, Receiver};
 use embedded_can::{Frame, StandardId};
 use proptest::prelude::*;
 use serde_json::Value;
@@ -150,12 +150,12 @@ fn ms(ms: u64) -> Instant {
     Instant::START + Duration::from_millis(ms)
 }
 
-const fn heard(at: Instant) -> Edge<Silence> {
-    Edge { source: (), condition: Silence, began: false, at }
+const fn heard(at: Instant) -> Edge<&'static str> {
+    Edge { source: (), condition: "silence", began: false, at }
 }
 
-const fn lost(at: Instant) -> Edge<Silence> {
-    Edge { source: (), condition: Silence, began: true, at }
+const fn lost(at: Instant) -> Edge<&'static str> {
+    Edge { source: (), condition: "silence", began: true, at }
 }
 
 fn robot(limit_w: u16) -> Vec<u8> {

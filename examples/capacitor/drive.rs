@@ -3,7 +3,7 @@
 use super::supply::{CAPACITOR_J, Supply};
 use drivetrain::chassis::{
     CapacitorPlan, Chassis, ChassisLimits, Mecanum, MecanumWheels, PowerBuffer, PowerFit,
-    PowerModel, WheelLoad,
+    PowerModel,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
@@ -99,9 +99,11 @@ impl Limiter {
 
     /// Between the update of the loops and the frames: the currents are known, and not yet on the wire.
     fn limit(&self, bus: &mut Bus, wheels: MecanumWheels<Handle<M3508>>) {
-        let loads = wheels.map(|wheel| WheelLoad {
-            torque: bus.commanded_current(wheel).map_or(0.0, |current| current.as_amperes()),
-            speed_rad_s: bus.state(wheel).map_or(0.0, |state| state.velocity.as_rad_per_s()),
+        let loads = wheels.map(|wheel| {
+            (
+                bus.commanded_current(wheel).map_or(0.0, |current| current.as_amperes()),
+                bus.state(wheel).map_or(AngularVelocity::ZERO, |state| state.velocity),
+            )
         });
         let (scale, _) = self.fit.model().cut(loads, self.allowed_w);
         bus.scale_outputs(wheels, scale);
@@ -110,10 +112,7 @@ impl Limiter {
     /// Learns the losses of the motors from the power that the controller measures.
     fn learn(&mut self, bus: &Bus, wheels: MecanumWheels<Handle<M3508>>, measured_w: f32) {
         if let Some(states) = wheels.map(|wheel| bus.state(wheel)).all() {
-            let present = states.map(|state| WheelLoad {
-                torque: state.current.as_amperes(),
-                speed_rad_s: state.velocity.as_rad_per_s(),
-            });
+            let present = states.map(|state| (state.current.as_amperes(), state.velocity));
             self.fit.learn(present, measured_w);
         }
     }
@@ -201,7 +200,7 @@ pub(crate) fn run(has_burst: bool, lost: Lost) -> Result<Vec<Sample>, Box<dyn Er
         runner.tick_limited(tick, |bus| limiter.limit(bus, wheels));
         samples.push(Sample {
             time_s,
-            speed_m_s: world.chassis().ok_or("no chassis")?.twist.linear().norm(),
+            speed_m_s: world.chassis().ok_or("no chassis")?.1.linear().norm(),
             chassis_w: supply.chassis_w,
             supply_w: supply.supply_w,
             allowed_w: limiter.allowed_w,

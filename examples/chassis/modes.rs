@@ -1,11 +1,11 @@
 //! The same robot under a gimbal and a pilot: what each mode makes of the same stick, and what a power limit leaves.
 
 use super::scenario::{
-    FRONT_LEFT_M, Robot, WHEEL_RADIUS_M, Wheels, at, attach_motors, narrow, robot, seconds_of,
+    FRONT_LEFT_M, Robot, WHEEL_RADIUS_M, Wheels, at, attach_motors, robot, seconds_of,
 };
 use drivetrain::chassis::{
     Chassis, ChassisLimits, ChassisMode, Mecanum, MecanumWheels, ModeConfig, Modes, PowerBuffer,
-    PowerFit, PowerModel, WheelLoad,
+    PowerFit, PowerModel,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::dji::Bus;
@@ -82,9 +82,9 @@ impl Drive {
             // This robot arms by itself, which only a simulated one may.
             let _not_yet = robot.is_armed() || robot.arm(tick).is_ok();
             let time_s = seconds_of(tick.now());
-            let truth = world.chassis().ok_or("no chassis")?;
+            let (pose, twist) = world.chassis().ok_or("no chassis")?;
             let gimbal = gimbal(time_s, self.seconds);
-            let yaw = gimbal - Angle::from_radians(narrow(truth.heading_rad));
+            let yaw = gimbal - pose.angle;
 
             modes.set_mode(self.mode_at(time_s));
             match modes.update(stick(time_s, self.seconds), Some(yaw), tick.dt_s()) {
@@ -107,11 +107,11 @@ impl Drive {
             outcome.samples.push(Sample {
                 time_s,
                 acting: modes.acting(),
-                position_m: (narrow(truth.x_m), narrow(truth.y_m)),
-                heading_deg: narrow(truth.heading_rad.to_degrees()),
+                position_m: (pose.x_m, pose.y_m),
+                heading_deg: pose.angle.as_degrees(),
                 gimbal_deg: gimbal.as_degrees(),
-                wz_rad_s: truth.twist.wz_rad_s,
-                speed_m_s: truth.twist.linear().norm(),
+                wz_rad_s: twist.wz_rad_s,
+                speed_m_s: twist.linear().norm(),
                 wheel_rpm: wheels.map(rpm),
                 power_w,
                 buffer_j: limiter.as_ref().map_or(BUFFER_J, |limiter| limiter.energy_j),
@@ -204,15 +204,14 @@ impl Limiter {
     fn limit(&mut self, bus: &mut Bus, wheels: Wheels, measured_w: f32, dt_s: f32) {
         self.energy_j = (self.energy_j + (self.limit_w - measured_w) * dt_s).clamp(0.0, BUFFER_J);
         let states = wheels.map(|wheel| bus.state(wheel));
-        let loads = wheels.zip(states).map(|(wheel, state)| WheelLoad {
-            torque: bus.commanded_current(wheel).map_or(0.0, |current| current.as_amperes()),
-            speed_rad_s: state.map_or(0.0, |state| state.velocity.as_rad_per_s()),
+        let loads = wheels.zip(states).map(|(wheel, state)| {
+            (
+                bus.commanded_current(wheel).map_or(0.0, |current| current.as_amperes()),
+                state.map_or(AngularVelocity::ZERO, |state| state.velocity),
+            )
         });
         if let Some(states) = states.all() {
-            let present = states.map(|state| WheelLoad {
-                torque: state.current.as_amperes(),
-                speed_rad_s: state.velocity.as_rad_per_s(),
-            });
+            let present = states.map(|state| (state.current.as_amperes(), state.velocity));
             self.fit.learn(present, measured_w);
         }
         let allowed_w = self.buffer.allowance_w(self.limit_w, Some(self.energy_j), dt_s);

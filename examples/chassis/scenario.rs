@@ -5,7 +5,7 @@ use super::silence::{CommandWatch, Silence};
 use drivetrain::chassis::{Mecanum, MecanumWheels};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
-use drivetrain::geometry::{Heading, Twist, Vec2, World as WorldFrame};
+use drivetrain::geometry::{Heading, Pose2, Twist, Vec2, World as WorldFrame};
 use drivetrain::motor::VelocityDrive;
 use drivetrain::runner::{Nb, Runner, Statistics};
 use drivetrain::sim::{
@@ -13,7 +13,7 @@ use drivetrain::sim::{
     Transmission, Wheel,
 };
 use drivetrain::time::{Duration, Instant, Tick};
-use drivetrain::units::{Angle, AngularVelocity};
+use drivetrain::units::AngularVelocity;
 use drivetrain::wire::Counts;
 use std::error::Error;
 
@@ -241,7 +241,7 @@ fn observe(
 ) -> Sample {
     let armed = robot.is_armed();
     let bus = robot.device();
-    let state = world.chassis();
+    let pose = world.chassis().map_or(Pose2::ORIGIN, |(pose, _)| pose);
     Sample {
         time_s,
         target_rpm: targets.map(AngularVelocity::as_rpm),
@@ -251,22 +251,15 @@ fn observe(
             world.motor(motor).map_or(0.0, |state| ahead * state.current.as_amperes())
         }),
         armed,
-        position_m: state.map_or((0.0, 0.0), |state| (narrow(state.x_m), narrow(state.y_m))),
+        position_m: (pose.x_m, pose.y_m),
         planned_m,
-        heading_rad: state.map_or(0.0, |state| narrow(state.heading_rad)),
+        heading_rad: pose.angle.as_radians(),
     }
 }
 
 /// Stands for the IMU.
 fn heading(world: &Simulation) -> Heading {
-    Heading::new(Angle::from_radians(
-        world.chassis().map_or(0.0, |state| narrow(state.heading_rad)),
-    ))
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "some metres or radians")]
-pub(crate) fn narrow(value: f64) -> f32 {
-    value as f32
+    world.chassis().map_or(Heading::ZERO, |(pose, _)| pose.heading())
 }
 
 fn share_of_error(sample: &Sample) -> f32 {

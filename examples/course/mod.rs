@@ -12,7 +12,6 @@ use axes::{Area, BLUE, RED, TIME, axes};
 use drivetrain::chassis::{Chassis, Kinematics};
 use drivetrain::geometry::{Heading, Pose2, Twist, Vec2, World};
 use drivetrain::sim;
-use drivetrain::units::Angle;
 use plotters::prelude::*;
 use std::error::Error;
 use std::f32::consts::TAU;
@@ -96,11 +95,9 @@ pub(crate) fn place(pose: Pose2<World>) -> Vec2 {
 }
 
 /// Where the robot truly is, and which way it faces; stands for the IMU.
-#[expect(clippy::cast_possible_truncation, reason = "some radians and metres")]
 pub(crate) fn truth(world: &sim::Simulation) -> Result<(Vec2, Heading), Box<dyn Error>> {
-    let state = world.chassis().ok_or("no chassis")?;
-    let heading = Heading::new(Angle::from_radians(state.heading_rad as f32));
-    Ok((Vec2::new(state.x_m as f32, state.y_m as f32), heading))
+    let (pose, _) = world.chassis().ok_or("no chassis")?;
+    Ok((place(pose), pose.heading()))
 }
 
 /// Prints how far the robot was off.

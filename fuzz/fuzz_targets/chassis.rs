@@ -4,7 +4,7 @@
 
 use drivetrain::chassis::{
     Chassis, ChassisLimits, ChassisMode, Differential, Kinematics, Mecanum, ModeConfig, Modes,
-    ModuleState, Omni, Swerve, SwerveSteering, WheelSpeed,
+    ModuleState, Omni, Swerve, WheelSpeed,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::geometry::{Heading, Pose2, Twist, Vec2};
@@ -40,7 +40,7 @@ fuzz_target!(|data: &[u8]| {
             let places = [vec2(&mut input), vec2(&mut input), vec2(&mut input), vec2(&mut input)];
             let Ok(layout) = Swerve::<4>::new(radius, places) else { return };
             let layout = layout.with_hysteresis(Angle::from_radians(input.float()));
-            let mut steering = SwerveSteering::new();
+            let mut steering = [None; 4];
             drive(layout, input, |input| {
                 let wanted = core::array::from_fn(|_| {
                     ModuleState::new(speed(input), Angle::from_radians(input.float()))

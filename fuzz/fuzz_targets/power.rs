@@ -1,8 +1,9 @@
 //! Any model, any loads, any readings: the power limiter cuts, and never adds.
 #![no_main]
 
-use drivetrain::chassis::{PowerBuffer, PowerFit, PowerModel, WheelLoad};
+use drivetrain::chassis::{PowerBuffer, PowerFit, PowerModel};
 use drivetrain::control::PidConfig;
+use drivetrain::units::AngularVelocity;
 use drivetrain_fuzz::Input;
 use libfuzzer_sys::fuzz_target;
 
@@ -19,9 +20,8 @@ fuzz_target!(|data: &[u8]| {
     // I9 and I10: a copy that starts anew wherever the loop does.
     let (mut buffer, mut clean) = (fresh, fresh);
     while !input.is_empty() {
-        let loads: [WheelLoad; 4] = core::array::from_fn(|_| WheelLoad {
-            torque: input.float(),
-            speed_rad_s: input.float(),
+        let loads: [(f32, AngularVelocity); 4] = core::array::from_fn(|_| {
+            (input.float(), AngularVelocity::from_rad_per_s(input.float()))
         });
         let limit_w = input.float();
         cut(&model, loads, limit_w);
@@ -48,20 +48,18 @@ fuzz_target!(|data: &[u8]| {
 });
 
 /// The factor is one, and what it promises holds when it is counted anew, in `f64`.
-fn cut(model: &PowerModel, loads: [WheelLoad; 4], limit_w: f32) {
+fn cut(model: &PowerModel, loads: [(f32, AngularVelocity); 4], limit_w: f32) {
     let (scale, power_w) = model.cut(loads, limit_w);
     assert!((0.0..=1.0).contains(&scale), "{scale}");
     let (again, same_w) = model.cut(loads, limit_w);
     assert_eq!((again.to_bits(), same_w.to_bits()), (scale.to_bits(), power_w.to_bits()), "I10");
     let limit = if limit_w > 0.0 { limit_w } else { 0.0 };
     let power =
-        |load: &WheelLoad, torque: f32| f64::from(model.power_w(WheelLoad { torque, ..*load }));
+        |load: &(f32, AngularVelocity), torque: f32| f64::from(model.power_w((torque, load.1)));
     let idle: f64 = loads.iter().map(|load| power(load, 0.0)).sum();
-    let cut_w: f64 = loads.iter().map(|load| power(load, load.torque * scale)).sum();
-    let size: f64 = loads
-        .iter()
-        .map(|load| power(load, load.torque).abs() + power(load, -load.torque).abs())
-        .sum();
+    let cut_w: f64 = loads.iter().map(|load| power(load, load.0 * scale)).sum();
+    let size: f64 =
+        loads.iter().map(|load| power(load, load.0).abs() + power(load, -load.0).abs()).sum();
     if power_w <= limit && cut_w.is_finite() && size.is_finite() && size < 1e30 {
         // A torque that is cut has no smaller step than this.
         let smallest = f32::from_bits(1);

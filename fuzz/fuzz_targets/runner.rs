@@ -4,10 +4,11 @@
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{ArmError, CanDevice, Devices};
 use drivetrain::runner::{EmergencyStop, Nb, Runner};
-use drivetrain::time::{Instant, ManualClock, Tick};
+use drivetrain::time::{Instant, Tick};
 use drivetrain_fuzz::{Clock, Gesture, Input, Watched};
 use embedded_can::ErrorKind;
 use libfuzzer_sys::fuzz_target;
+use std::cell::Cell;
 
 const KINDS: [ErrorKind; 7] = [
     ErrorKind::Overrun,
@@ -157,7 +158,7 @@ impl Known {
 fuzz_target!(|data: &[u8]| {
     STOP.clear();
     let mut input = Input(data);
-    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let clock = Cell::new(Instant::from_micros(1_000));
     let (mut time, mut known, mut has_stood) = (Clock::new(1_000), Known::default(), false);
     let runner = Runner::new(Nb(Scripted::default()), &clock, Watched::new(input.good_frames()));
     let mut runner = runner.with_emergency_stop(&STOP);
@@ -174,7 +175,7 @@ fuzz_target!(|data: &[u8]| {
                 runner.port_mut().0.received.push(Err(kind));
             }
             48..=63 => {
-                hear_all(&mut runner, &mut known, clock.now().as_micros());
+                hear_all(&mut runner, &mut known, clock.get().as_micros());
                 direct += 5;
             }
             64..=89 => {
@@ -184,7 +185,7 @@ fuzz_target!(|data: &[u8]| {
                 let came = runner.poll(budget);
                 runner.port_mut().0.is_polled = false;
                 let asked = runner.port_mut().0.asked - asked;
-                known.show(clock.now().as_micros(), 1 + u64::from(asked));
+                known.show(clock.get().as_micros(), 1 + u64::from(asked));
                 known.hear(asked.into());
                 assert!(asked as usize <= budget && came <= budget, "I1");
             }
@@ -196,11 +197,11 @@ fuzz_target!(|data: &[u8]| {
                 let motor = input.byte();
                 runner.device_mut().set(motor.into(), input.target());
             }
-            150..=159 => arm(&mut runner, &mut known, clock.now().as_micros()),
+            150..=159 => arm(&mut runner, &mut known, clock.get().as_micros()),
             160..=161 => STOP.set(),
             162 if !has_stood => {
                 has_stood = true;
-                let now = clock.now().as_micros();
+                let now = clock.get().as_micros();
                 direct += stand(&mut runner, &mut known, now, input.coin());
             }
             162..=167 => runner.clear_emergency_stop(),
@@ -233,7 +234,7 @@ fuzz_target!(|data: &[u8]| {
                 let now = time.pass(&mut input);
                 clock.set(Instant::from_micros(now));
                 let tick = if kind < 180 {
-                    Some(Tick::new(clock.now(), input.step_s()))
+                    Some(Tick::new(clock.get(), input.step_s()))
                 } else {
                     let tick = runner.due();
                     known.check(now, tick);
@@ -258,7 +259,7 @@ fuzz_target!(|data: &[u8]| {
     assert_eq!(s.superseded, superseded);
 });
 
-type Shell<'a> = Runner<Nb<Scripted>, &'a ManualClock, Watched>;
+type Shell<'a> = Runner<Nb<Scripted>, &'a Cell<Instant>, Watched>;
 
 fn step(runner: &mut Shell, known: &mut Known, tick: Tick) {
     let offered = runner.port_mut().0.offered;

@@ -3,14 +3,14 @@
 
 use core::array::from_fn;
 use drivetrain::wire::Deframer;
-use drivetrain::wire::vofa::{JustFloat, justfloat};
+use drivetrain::wire::vofa::justfloat;
 use drivetrain_fuzz::{Input, any_split_gives_the_same};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {
-    any_split_gives_the_same::<JustFloat<3>>((), data, plot);
+    any_split_gives_the_same::<[f32; 3]>((), data, plot);
     let mut input = Input(data);
-    let mut reader = Deframer::<JustFloat<3>, 16>::new();
+    let mut reader = Deframer::<[f32; 3], 16>::new();
     while !input.is_empty() {
         let frame = plot(&mut input);
         let ends = frame.windows(4).filter(|bytes| *bytes == [0, 0, 0x80, 0x7F]);

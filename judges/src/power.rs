@@ -8,7 +8,8 @@
 
 use crate::defect::defects;
 use crate::{Outcome, floats};
-use drivetrain::chassis::{PowerFit, PowerModel, WheelLoad};
+use drivetrain::chassis::{PowerFit, PowerModel};
+use drivetrain::units::AngularVelocity;
 use std::io::{Read, Write};
 
 defects! {
@@ -35,15 +36,19 @@ pub fn run(arguments: &[&str], mut input: impl Read, output: &mut impl Write) ->
         for _ in 0..steps {
             let loads: [f32; 8] = floats::read(&mut input)?;
             let [measured_w] = floats::read(&mut input)?;
-            let wheels = loads.chunks_exact(2).map(|load| WheelLoad {
-                torque: if defect == Defect::Torque { load[0].abs().sqrt() } else { load[0] },
-                speed_rad_s: load[1],
+            let wheels = loads.chunks_exact(2).map(|load| {
+                (
+                    if defect == Defect::Torque { load[0].abs().sqrt() } else { load[0] },
+                    AngularVelocity::from_rad_per_s(load[1]),
+                )
             });
             let count = if defect == Defect::Wheel { 3 } else { 4 };
             fit.learn(wheels.take(count), measured_w);
         }
         let model = fit.model();
-        let power = |torque, speed_rad_s| model.power_w(WheelLoad { torque, speed_rad_s });
+        let power = |torque, speed_rad_s| {
+            model.power_w((torque, AngularVelocity::from_rad_per_s(speed_rad_s)))
+        };
         floats::write([(0.0, 0.0), (1.0, 0.0), (0.0, 30.0)].map(|(t, s)| power(t, s)), output)?;
     }
     Ok(())

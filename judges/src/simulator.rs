@@ -178,12 +178,12 @@ fn sample(world: &Simulation, motors: &[MotorKey], output: &mut impl Write) -> O
         let (velocity, current) = (state.velocity.as_rad_per_s(), state.current.as_amperes());
         write!(output, "{angle} {velocity} {current} ")?;
     }
-    if let Some(state) = world.chassis() {
-        let twist = state.twist;
+    if let Some((pose, twist)) = world.chassis() {
+        let heading = pose.angle.as_radians();
         write!(
             output,
             "{} {} {} {} {} {}",
-            state.x_m, state.y_m, state.heading_rad, twist.vx_m_s, twist.vy_m_s, twist.wz_rad_s
+            pose.x_m, pose.y_m, heading, twist.vx_m_s, twist.vy_m_s, twist.wz_rad_s
         )?;
     }
     Ok(writeln!(output)?)

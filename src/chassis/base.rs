@@ -1,7 +1,6 @@
+use super::drive::WheelDrive;
 use super::kinematics::{Fastest, slowed};
-use super::{
-    ChassisLimits, ChassisStatus, DeadClock, Kinematics, Odometry, WheelDrive, WheelSpeed,
-};
+use super::{ChassisLimits, ChassisStatus, DeadClock, Kinematics, Odometry, WheelSpeed};
 use crate::error::ConfigError;
 use crate::geometry::{Body, Heading, Pose2, Twist, World};
 use crate::time::Tick;
@@ -312,8 +311,8 @@ impl<K: Kinematics> Chassis<K> {
     /// Reads the motors of all wheels, sets their targets, and returns the targets.
     ///
     /// `owner` is a [`VelocityDrive`](crate::motor::VelocityDrive): a bus, a motor of the application, or a tuple or array of
-    /// these. The handle of a wheel is that of its motor, the handle of a swerve module is
-    /// [`ModuleMotors`](super::ModuleMotors). For motors on two buses, with a runner each, `owner` is the tuple of both buses
+    /// these; for swerve modules, an [`AngleDrive`](crate::motor::AngleDrive) too. The handle of a wheel is that of its motor, the
+    /// handle of a swerve module is [`ModuleMotors`](super::ModuleMotors). For motors on two buses, with a runner each, `owner` is the tuple of both buses
     /// and a handle names its bus ([`OneOf`](crate::motor::OneOf)); each runner keeps its own `due` and `tick`.
     ///
     /// If a motor refuses its target, [`status`](Self::status) counts the refusal and keeps the first error; all other

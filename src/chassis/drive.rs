@@ -4,38 +4,10 @@ use super::ModuleState;
 use crate::motor::{AngleDrive, TargetError, VelocityDrive};
 use crate::units::{Angle, AngularVelocity};
 
-/// An owner of the motors of wheels, for [`Chassis::drive`](super::Chassis::drive).
+/// An owner of the motors of wheels, with handles `H`, for [`Chassis::drive`](super::Chassis::drive).
 ///
-/// `H` is the handle of a wheel, `S` its speed. A [`VelocityDrive`] drives plain wheels. An owner that is also an
-/// [`AngleDrive`] drives the modules of a [`Swerve`](super::Swerve).
-///
-/// # Examples
-/// ```
-/// use drivetrain::chassis::{Chassis, Differential};
-/// use drivetrain::motor::{TargetError, VelocityDrive};
-/// use drivetrain::{geometry::Twist, time::{Instant, Tick}, units::AngularVelocity};
-///
-/// /// Two motors that do at once what they are told.
-/// struct Motors([AngularVelocity; 2]);
-///
-/// impl VelocityDrive<usize> for Motors {
-///     fn velocity(&self, motor: usize) -> Option<AngularVelocity> {
-///         self.0.get(motor).copied()
-///     }
-///     fn set_velocity(&mut self, motor: usize, target: AngularVelocity) -> Result<(), TargetError> {
-///         *self.0.get_mut(motor).ok_or(TargetError::Detached)? = target;
-///         Ok(())
-///     }
-/// }
-///
-/// let mut chassis = Chassis::new(Differential::new(0.1, 0.25)?);
-/// let mut motors = Motors([AngularVelocity::ZERO; 2]);
-/// chassis.set_body(Twist::new(1.0, 0.0, 0.0));
-/// let tick = Tick::new(Instant::from_micros(1_000), 0.001);
-/// chassis.drive(&mut motors, [0, 1], tick);
-/// assert!((motors.0[1].as_rad_per_s() - 10.0).abs() < 1e-5);
-/// # Ok::<(), drivetrain::error::ConfigError>(())
-/// ```
+/// Each [`VelocityDrive`] drives plain wheels, and each that is also an [`AngleDrive`] drives modules: a bound on these is
+/// the bound of a generic program.
 pub trait WheelDrive<H: Copy, S> {
     /// Returns the measured speed of the wheel; `None` without fresh feedback.
     fn measured(&self, wheel: H) -> Option<S>;

@@ -23,7 +23,7 @@
 //! | on top of a layout | function |
 //! |---|---|
 //! | [`Chassis`] | commands in body or world frame, [`ChassisLimits`], [`Odometry`], lost wheels, lock |
-//! | [`WheelDrive`] | the motors that it drives, of one device or of several; [`ModuleMotors`] for swerve modules |
+//! | [`Chassis::drive`] | its motors, of one device or of several; [`ModuleMotors`] for swerve modules |
 //! | [`Modes`] | relax, follow the gimbal, rotor, independent |
 //! | [`PowerModel`], [`PowerBuffer`], [`PowerFit`] | cut all torques by one factor to keep a power limit |
 //! | [`CapacitorPlan`] | adds the power of a super-capacitor to the limit, down to its reserve |
@@ -46,6 +46,34 @@
 //! assert!((targets.front_left.as_rad_per_s() - 1.0 / 0.076).abs() < 1e-3); // strafing to the right
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+//!
+//! An owner of motors that the application wrote is a [`VelocityDrive`](crate::motor::VelocityDrive):
+//! ```
+//! use drivetrain::chassis::{Chassis, Differential};
+//! use drivetrain::motor::{TargetError, VelocityDrive};
+//! use drivetrain::{geometry::Twist, time::{Instant, Tick}, units::AngularVelocity};
+//!
+//! /// Two motors that do at once what they are told.
+//! struct Motors([AngularVelocity; 2]);
+//!
+//! impl VelocityDrive<usize> for Motors {
+//!     fn velocity(&self, motor: usize) -> Option<AngularVelocity> {
+//!         self.0.get(motor).copied()
+//!     }
+//!     fn set_velocity(&mut self, motor: usize, target: AngularVelocity) -> Result<(), TargetError> {
+//!         *self.0.get_mut(motor).ok_or(TargetError::Detached)? = target;
+//!         Ok(())
+//!     }
+//! }
+//!
+//! let mut chassis = Chassis::new(Differential::new(0.1, 0.25)?);
+//! let mut motors = Motors([AngularVelocity::ZERO; 2]);
+//! chassis.set_body(Twist::new(1.0, 0.0, 0.0));
+//! let tick = Tick::new(Instant::from_micros(1_000), 0.001);
+//! chassis.drive(&mut motors, [0, 1], tick);
+//! assert!((motors.0[1].as_rad_per_s() - 10.0).abs() < 1e-5);
+//! # Ok::<(), drivetrain::error::ConfigError>(())
+//! ```
 
 mod balance;
 mod base;
@@ -63,16 +91,16 @@ mod swerve;
 
 pub use balance::{BalancePhase, Balancer};
 pub use base::Chassis;
-pub use drive::{ModuleMotors, WheelDrive};
+pub use drive::ModuleMotors;
 pub use kinematics::{Kinematics, WheelSpeed};
 pub use leg::{BalanceModel, FiveBar, LegEffort, LegState};
 pub use mecanum::{Mecanum, MecanumWheels};
 pub use mode::{ChassisMode, ModeConfig, Modes};
 pub use odometry::Odometry;
 pub use omni::{Differential, Omni};
-pub use power::{PowerFit, PowerModel, WheelLoad};
+pub use power::{PowerFit, PowerModel};
 pub use power_buffer::{CapacitorPlan, PowerBuffer};
-pub use steering::{ModuleState, SwerveSteering};
+pub use steering::ModuleState;
 pub use swerve::Swerve;
 
 use crate::error::ConfigError;

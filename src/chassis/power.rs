@@ -1,41 +1,25 @@
 use super::not_negative;
 use crate::error::ConfigError;
 use crate::math::sqrt;
-
-/// Load of one wheel: torque at its shaft, and its speed.
-///
-/// # Examples
-/// ```
-/// use drivetrain::chassis::{PowerModel, WheelLoad};
-///
-/// let mechanical = PowerModel::new(0.0, 1.0, 0.0, 0.0)?;
-/// let braking = WheelLoad { torque: -2.0, speed_rad_s: 30.0 };
-/// assert_eq!(mechanical.power_w(braking), -60.0); // fed back
-/// # Ok::<(), drivetrain::error::ConfigError>(())
-/// ```
-#[derive(Debug, Default, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct WheelLoad {
-    /// Torque in N m, or the measure in proportion to it to which the model was fitted, such as a current in A.
-    pub torque: f32,
-    /// Speed in rad/s. Of the same sign as the torque when driving, of the other when braking.
-    pub speed_rad_s: f32,
-}
+use crate::units::AngularVelocity;
 
 /// The electric power of a motor: `P = k0 + k1 torque speed + k2 torque^2 + k3 speed^2`, in W.
 ///
-/// With the torque in N m at the same shaft as the speed, `k1` is 1: the mechanical power. `k2` is the heat in the
+/// The load of a wheel is the torque at its shaft, in N m or in the measure to which the model was fitted, such as a current in A, and its
+/// speed in rad/s, of the same sign when driving, of the other when braking. With the torque in N m at the same shaft as the speed, `k1` is 1: the mechanical power. `k2` is the heat in the
 /// winding, `k3` the friction and iron loss, `k0` the power of the electronics. Fit the coefficients to the motors in
 /// use, for example by [`PowerFit`].
 ///
 /// # Examples
 /// ```
-/// use drivetrain::chassis::{PowerModel, WheelLoad};
+/// use drivetrain::{chassis::PowerModel, units::AngularVelocity};
 ///
 /// let model = PowerModel::new(1.0, 1.0, 2.0, 0.001)?;
-/// let load = WheelLoad { torque: 2.0, speed_rad_s: 10.0 };
+/// let load = (2.0, AngularVelocity::from_rad_per_s(10.0));
 /// assert!((model.power_w(load) - (1.0 + 20.0 + 8.0 + 0.1)).abs() < 1e-5);
+///
+/// let mechanical = PowerModel::new(0.0, 1.0, 0.0, 0.0)?;
+/// assert_eq!(mechanical.power_w((-2.0, AngularVelocity::from_rad_per_s(30.0))), -60.0); // fed back
 /// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -85,8 +69,9 @@ impl PowerModel {
 
     /// Returns the power of one wheel in W; negative when the wheel feeds back more than its losses.
     #[must_use]
-    pub const fn power_w(&self, load: WheelLoad) -> f32 {
-        let WheelLoad { torque, speed_rad_s } = load;
+    pub const fn power_w(&self, load: (f32, AngularVelocity)) -> f32 {
+        let (torque, speed) = load;
+        let speed_rad_s = speed.as_rad_per_s();
         self.k0
             + self.k1 * torque * speed_rad_s
             + self.k2 * torque * torque
@@ -104,23 +89,28 @@ impl PowerModel {
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::chassis::{PowerModel, WheelLoad};
+    /// use drivetrain::{chassis::PowerModel, units::AngularVelocity};
     ///
     /// let model = PowerModel::new(0.0, 1.0, 2.0, 0.0)?;
-    /// let wheel = WheelLoad { torque: 2.0, speed_rad_s: 6.0 }; // 12 W and 8 W of heat
+    /// let wheel = (2.0, AngularVelocity::from_rad_per_s(6.0)); // 12 W and 8 W of heat
     /// let (scale, power_w) = model.cut([wheel; 4], 32.0); // 48 s + 32 s^2 = 32
     /// assert!((scale - 0.5).abs() < 1e-6 && power_w <= 32.0);
     ///
     /// let model = PowerModel::new(5.0, 1.0, 2.0, 0.0)?;
-    /// let stalled = WheelLoad { torque: 3.0, speed_rad_s: 0.0 };
+    /// let stalled = (3.0, AngularVelocity::ZERO);
     /// assert_eq!(model.cut([stalled; 4], 10.0), (0.0, 20.0)); // the electronics alone take 20 W
     /// # Ok::<(), drivetrain::error::ConfigError>(())
     /// ```
     #[must_use]
-    pub fn cut(&self, wheels: impl IntoIterator<Item = WheelLoad>, limit_w: f32) -> (f32, f32) {
+    pub fn cut(
+        &self,
+        wheels: impl IntoIterator<Item = (f32, AngularVelocity)>,
+        limit_w: f32,
+    ) -> (f32, f32) {
         let limit_w = if limit_w > 0.0 { limit_w } else { 0.0 };
         let (mut square, mut linear, mut fixed) = (0.0_f32, 0.0_f32, 0.0_f32);
-        for WheelLoad { torque, speed_rad_s } in wheels {
+        for (torque, speed) in wheels {
+            let speed_rad_s = speed.as_rad_per_s();
             square += self.k2 * torque * torque;
             linear += self.k1 * torque * speed_rad_s;
             fixed += self.k0 + self.k3 * speed_rad_s * speed_rad_s;
@@ -174,15 +164,15 @@ fn largest_root(square: f32, linear: f32, rest: f32) -> f32 {
 ///
 /// # Examples
 /// ```
-/// use drivetrain::chassis::{PowerFit, PowerModel, WheelLoad};
+/// use drivetrain::{chassis::{PowerFit, PowerModel}, units::AngularVelocity};
 ///
 /// let truth = PowerModel::new(1.0, 1.0, 2.0, 0.01)?;
 /// let mut fit = PowerFit::new(PowerModel::new(0.0, 1.0, 1.0, 0.0)?, 0.999);
 /// for step in 0..2000_u16 {
-///     let wheel = WheelLoad { torque: f32::from(step % 7), speed_rad_s: f32::from(step % 50) };
+///     let wheel = (f32::from(step % 7), AngularVelocity::from_rad_per_s(f32::from(step % 50)));
 ///     fit.learn([wheel; 4], 4.0 * truth.power_w(wheel));
 /// }
-/// let load = WheelLoad { torque: 3.0, speed_rad_s: 25.0 };
+/// let load = (3.0, AngularVelocity::from_rad_per_s(25.0));
 /// assert!((fit.model().power_w(load) - truth.power_w(load)).abs() < 0.05);
 /// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
@@ -220,9 +210,14 @@ impl PowerFit {
 
     /// Learns from the loads of all wheels and the power in W measured with them; leaves out and counts values that are
     /// not finite, or make the fit so.
-    pub fn learn(&mut self, wheels: impl IntoIterator<Item = WheelLoad>, measured_w: f32) {
+    pub fn learn(
+        &mut self,
+        wheels: impl IntoIterator<Item = (f32, AngularVelocity)>,
+        measured_w: f32,
+    ) {
         let (mut features, mut rest_w) = ([0.0_f32; 3], measured_w);
-        for WheelLoad { torque, speed_rad_s } in wheels {
+        for (torque, speed) in wheels {
+            let speed_rad_s = speed.as_rad_per_s();
             rest_w -= self.k1 * torque * speed_rad_s;
             features = add(features, [1.0, torque * torque, speed_rad_s * speed_rad_s]);
         }
@@ -299,8 +294,8 @@ mod tests {
         PowerModel::new(1.0, 1.0, 2.0, 0.001).unwrap()
     }
 
-    fn load(torque: f32, speed_rad_s: f32) -> WheelLoad {
-        WheelLoad { torque, speed_rad_s }
+    fn load(torque: f32, speed_rad_s: f32) -> (f32, AngularVelocity) {
+        (torque, AngularVelocity::from_rad_per_s(speed_rad_s))
     }
 
     #[test]
@@ -395,7 +390,8 @@ mod tests {
             let [k0, k1, k2, k3] = [k0, k1, k2, k3].map(f64::from);
             let total = |scale: f32| -> f64 {
                 loads.clone().map(|wheel| {
-                    let (t, w) = (f64::from(wheel.torque * scale), f64::from(wheel.speed_rad_s));
+                    let (torque, speed) = wheel;
+                    let (t, w) = (f64::from(torque * scale), f64::from(speed.as_rad_per_s()));
                     k0 + k1 * t * w + k2 * t * t + k3 * w * w
                 }).sum()
             };
@@ -425,7 +421,7 @@ mod tests {
             (state >> 8) as f32 / 8_388_608.0 - 1.0
         };
         for _ in 0..steps {
-            let load = WheelLoad { torque: 3.0 * random(), speed_rad_s: 50.0 * random() };
+            let load = (3.0 * random(), AngularVelocity::from_rad_per_s(50.0 * random()));
             fit.learn([load; 4], 4.0 * truth.power_w(load) + noise * random());
         }
     }
@@ -455,7 +451,7 @@ mod tests {
         let truth = PowerModel::new(1.5, 1.0, 1.8, 0.004).unwrap();
         drive(&mut fit, truth, 0.0, 5_000);
         for _ in 0..3_600_000 / 36 {
-            fit.learn([WheelLoad::default(); 4], 6.0);
+            fit.learn([(0.0, AngularVelocity::ZERO); 4], 6.0);
         }
         near(&fit, truth, 0.02);
         assert!(fit.covariance.as_flattened().iter().all(|value| value.abs() <= UNCERTAIN));
@@ -465,9 +461,9 @@ mod tests {
     fn measurements_that_are_not_finite_are_counted_and_left_out() {
         let mut fit = start();
         let before = fit.model();
-        fit.learn([WheelLoad { torque: f32::NAN, speed_rad_s: 0.0 }], 1.0);
-        fit.learn([WheelLoad { torque: 1.0, speed_rad_s: 1.0 }], f32::INFINITY);
-        fit.learn([WheelLoad { torque: 1e30, speed_rad_s: 0.0 }], 1.0);
+        fit.learn([(f32::NAN, AngularVelocity::ZERO)], 1.0);
+        fit.learn([(1.0, AngularVelocity::from_rad_per_s(1.0))], f32::INFINITY);
+        fit.learn([(1e30, AngularVelocity::ZERO)], 1.0);
         assert_eq!((fit.model(), fit.rejected()), (before, 3));
     }
     // One such reading made a model of NaN, read as no losses: the power limit passed everything
@@ -478,7 +474,7 @@ mod tests {
         for (torque, speed_rad_s, measured_w) in
             [(1.0, 1.0, 3e38), (1.0, 2.0, -3e38), (2.0, 1.0, -3e38), (1e8, 1.0, 3e38)]
         {
-            fit.learn([WheelLoad { torque, speed_rad_s }; 4], measured_w);
+            fit.learn([(torque, AngularVelocity::from_rad_per_s(speed_rad_s)); 4], measured_w);
             assert!(fit.losses.iter().all(|loss| loss.is_finite()), "{fit:?}");
         }
         assert!(fit.rejected() > 0);

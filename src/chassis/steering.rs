@@ -78,26 +78,6 @@ impl Steering {
     }
 }
 
-/// Memory of the modules of a [`Swerve`](super::Swerve) from tick to tick: the commanded angle of each.
-///
-/// [`Chassis`](super::Chassis) keeps this memory. Without a chassis, keep it beside the layout for
-/// [`Swerve::steer`](super::Swerve::steer) and [`Swerve::lock`](super::Swerve::lock), and take a new memory when the motors were relaxed.
-///
-/// # Examples
-/// ```
-/// use drivetrain::{chassis::{ModuleState, Swerve, SwerveSteering}, geometry::Vec2, units::Angle};
-///
-/// let swerve = Swerve::new(0.1, [Vec2::new(0.3, 0.0), Vec2::new(-0.3, 0.0)])?;
-/// let mut steering = SwerveSteering::new();
-/// let measured = [70.0, -20.0].map(|degrees| Some(Angle::from_degrees(degrees)));
-/// let [front, rear] = swerve.steer(&mut steering, [ModuleState::default(); 2], measured);
-/// assert!((front.angle.as_degrees() - 70.0).abs() < 1e-4); // told to stand, each holds its angle
-/// assert!((rear.angle.as_degrees() + 20.0).abs() < 1e-4);
-/// # Ok::<(), drivetrain::error::ConfigError>(())
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SwerveSteering<const N: usize>(pub(super) [Module; N]);
-
 /// Memory of one module.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Module {
@@ -107,21 +87,21 @@ pub(super) struct Module {
     reversed: bool,
 }
 
-impl<const N: usize> SwerveSteering<N> {
-    /// Makes an empty memory: a module without a command holds its first measured angle.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self([Module { target_rad: 0.0, has_target: false, reversed: false }; N])
-    }
-}
-
-impl<const N: usize> Default for SwerveSteering<N> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl Module {
+    /// Acts on a module by its memory: the commanded angle, and whether the drive is reversed.
+    pub(super) fn with(
+        memory: &mut Option<(Angle, bool)>,
+        act: impl FnOnce(&mut Self) -> ModuleState,
+    ) -> ModuleState {
+        let (target, reversed) = memory.unwrap_or((Angle::ZERO, false));
+        let has_target = memory.is_some();
+        let mut module = Self { target_rad: target.as_radians(), has_target, reversed };
+        let state = act(&mut module);
+        let Self { target_rad, has_target, reversed } = module;
+        *memory = has_target.then_some((Angle::from_radians(target_rad), reversed));
+        state
+    }
+
     pub(super) fn steer(
         &mut self,
         config: Steering,
@@ -218,12 +198,12 @@ mod tests {
     /// One module and its memory.
     struct One {
         swerve: Swerve<2>,
-        steering: SwerveSteering<2>,
+        steering: [Option<(Angle, bool)>; 2],
     }
 
     impl One {
         fn new(swerve: Swerve<2>) -> Self {
-            Self { swerve, steering: SwerveSteering::new() }
+            Self { swerve, steering: [None; 2] }
         }
 
         fn steer(&mut self, wanted: ModuleState, measured: Option<f32>) -> (f32, f32) {
@@ -399,7 +379,7 @@ mod tests {
     fn a_module_at_the_centre_holds_its_angle_in_the_lock() {
         let swerve = Swerve::new(0.05, [Vec2::ZERO, Vec2::new(0.3, 0.0)]).unwrap();
         let measured = [Some(Angle::from_degrees(70.0)); 2];
-        let [centre, _] = swerve.lock(&mut SwerveSteering::new(), measured);
+        let [centre, _] = swerve.lock(&mut [None; 2], measured);
         assert!((centre.angle.as_degrees() - 70.0).abs() < 1e-3);
     }
 

@@ -1,6 +1,6 @@
 use super::kinematics::{Normal, Row, fit};
 use super::omni::zip_arrays;
-use super::steering::{ModuleState, Steering, SwerveSteering};
+use super::steering::{Module, ModuleState, Steering};
 use super::{Kinematics, positive};
 use crate::error::ConfigError;
 use crate::geometry::{Body, Twist, Vec2};
@@ -101,12 +101,12 @@ impl<const N: usize> Swerve<N> {
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::{chassis::{Swerve, SwerveSteering}, geometry::{Twist, Vec2}, units::Angle};
+    /// use drivetrain::{chassis::Swerve, geometry::{Twist, Vec2}, units::Angle};
     ///
     /// let swerve = Swerve::new(0.1, [Vec2::new(0.3, 0.0), Vec2::new(-0.3, 0.0)])?
     ///     .with_hysteresis(Angle::from_degrees(20.0));
     /// let left = swerve.inverse(Twist::new(-0.1763, 1.0, 0.0)); // 100 degrees
-    /// let [front, _] = swerve.steer(&mut SwerveSteering::new(), left, [Some(Angle::ZERO); 2]);
+    /// let [front, _] = swerve.steer(&mut [None; 2], left, [Some(Angle::ZERO); 2]);
     /// assert!((front.angle.as_degrees() - 100.0).abs() < 0.3); // and not -80 with the drive reversed
     /// # Ok::<(), drivetrain::error::ConfigError>(())
     /// ```
@@ -135,6 +135,10 @@ impl<const N: usize> Swerve<N> {
 impl<const N: usize> Swerve<N> {
     /// Returns the target of each module, from the wanted states and the measured angles.
     ///
+    /// `memory` has for each module its commanded angle, and whether its drive is reversed. [`Chassis`](super::Chassis) keeps this memory;
+    /// without a chassis, keep it beside the layout for [`steer`](Self::steer) and [`lock`](Self::lock), and begin with `None`
+    /// when the motors were relaxed: a module without a memory and a command holds its first measured angle.
+    ///
     /// * A module turns by at most 90 degrees and the hysteresis; if the opposite direction is nearer, its drive reverses.
     ///   The hysteresis keeps a command at 90 degrees from flipping the module to and fro.
     /// * A module away from its target angle drives with the cosine of its error, so it does not push sideways.
@@ -147,26 +151,30 @@ impl<const N: usize> Swerve<N> {
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::{chassis::{ModuleState, Swerve, SwerveSteering}, geometry::{Twist, Vec2}, units::Angle};
+    /// use drivetrain::{chassis::Swerve, geometry::{Twist, Vec2}, units::Angle};
     ///
     /// let swerve = Swerve::new(0.1, [Vec2::new(0.3, 0.0), Vec2::new(-0.3, 0.0)])?;
-    /// let mut steering = SwerveSteering::new();
+    /// let mut memory = [None; 2];
     /// let back = swerve.inverse(Twist::new(-1.0, 0.1763, 0.0)); // 170 degrees
-    /// let [front, _] = swerve.steer(&mut steering, back, [Some(Angle::ZERO); 2]);
+    /// let [front, _] = swerve.steer(&mut memory, back, [Some(Angle::ZERO); 2]);
     /// assert!((front.angle.as_degrees() + 10.0).abs() < 0.3); // 10 degrees to the right, drive reversed
     /// assert!((front.velocity.as_rad_per_s() + 10.0).abs() < 0.01); // 10.15 rad/s times cos(10 degrees)
+    /// let [front, _] = swerve.steer(&mut memory, [drivetrain::chassis::ModuleState::default(); 2], [Some(Angle::from_degrees(-4.0)); 2]);
+    /// assert!((front.angle.as_degrees() + 10.0).abs() < 0.3); // told to stand, a module keeps its angle
     /// # Ok::<(), drivetrain::error::ConfigError>(())
     /// ```
     pub fn steer(
         &self,
-        steering: &mut SwerveSteering<N>,
+        memory: &mut [Option<(Angle, bool)>; N],
         wanted: [ModuleState; N],
         measured: [Option<Angle>; N],
     ) -> [ModuleState; N] {
         let config = self.steering;
         let mut inputs = wanted.into_iter().zip(measured);
-        steering.0.each_mut().map(|module| match inputs.next() {
-            Some((wanted, measured)) => module.steer(config, wanted, measured),
+        memory.each_mut().map(|memory| match inputs.next() {
+            Some((wanted, measured)) => {
+                Module::with(memory, |module| module.steer(config, wanted, measured))
+            }
             None => ModuleState::default(),
         })
     }
@@ -177,13 +185,15 @@ impl<const N: usize> Swerve<N> {
     /// A module at the origin has no such direction, and holds its angle.
     pub fn lock(
         &self,
-        steering: &mut SwerveSteering<N>,
+        memory: &mut [Option<(Angle, bool)>; N],
         measured: [Option<Angle>; N],
     ) -> [ModuleState; N] {
         let config = self.steering;
         let mut inputs = self.positions_m().iter().zip(measured);
-        steering.0.each_mut().map(|module| match inputs.next() {
-            Some((&position, measured)) => module.lock(config, position, measured),
+        memory.each_mut().map(|memory| match inputs.next() {
+            Some((&position, measured)) => {
+                Module::with(memory, |module| module.lock(config, position, measured))
+            }
             None => ModuleState::default(),
         })
     }
@@ -192,9 +202,10 @@ impl<const N: usize> Swerve<N> {
 impl<const N: usize> Kinematics for Swerve<N> {
     type Wheels<T: Copy> = [T; N];
     type Speed = ModuleState;
-    type Steering = SwerveSteering<N>;
+    /// The commanded angle of each module, and whether its drive is reversed; `None` before its first measured angle.
+    type Steering = [Option<(Angle, bool)>; N];
 
-    const UNSTEERED: SwerveSteering<N> = SwerveSteering::new();
+    const UNSTEERED: Self::Steering = [None; N];
 
     fn inverse(&self, twist: Twist<Body>) -> [ModuleState; N] {
         self.inverse(twist)
@@ -217,7 +228,7 @@ impl<const N: usize> Kinematics for Swerve<N> {
 
     fn steer(
         &self,
-        steering: &mut SwerveSteering<N>,
+        steering: &mut Self::Steering,
         wanted: [ModuleState; N],
         measured: [Option<ModuleState>; N],
     ) -> [ModuleState; N] {
@@ -226,7 +237,7 @@ impl<const N: usize> Kinematics for Swerve<N> {
 
     fn lock(
         &self,
-        steering: &mut SwerveSteering<N>,
+        steering: &mut Self::Steering,
         measured: [Option<ModuleState>; N],
     ) -> [ModuleState; N] {
         self.lock(steering, angles(measured))

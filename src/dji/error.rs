@@ -78,9 +78,30 @@ pub(super) struct SteepGain {
 }
 
 impl AttachError {
-    /// Returns the error in words; `const`, so a `const` wiring can fail to compile with this text.
+    /// The length of the longest text of an error in bytes.
+    pub const LONGEST: usize = 144;
+
+    /// Writes the error in words to `text`, and returns it; `const`, so a `const` wiring can fail to compile with this text.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::dji::{AttachError, Bus, Config, M3508};
+    ///
+    /// let error = Bus::new().attach(Config::<M3508>::new(9)).unwrap_err();
+    /// assert_eq!(error.message(&mut [0; AttachError::LONGEST]), "M3508 #9: the id is not within 1..=8");
+    /// ```
     #[must_use]
-    pub const fn message(&self) -> Message {
+    pub const fn message<'t>(&self, text: &'t mut [u8; Self::LONGEST]) -> &'t str {
+        let message = self.in_words();
+        *text = message.text;
+        let Some((text, _)) = text.split_at_checked(message.length) else { return "" };
+        match core::str::from_utf8(text) {
+            Ok(text) => text,
+            Err(_) => "",
+        }
+    }
+
+    const fn in_words(&self) -> Message {
         let message = Message::new();
         match self {
             Self::Id { motor, highest } => {
@@ -137,7 +158,7 @@ impl AttachError {
 
 impl core::fmt::Display for AttachError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(self.message().as_str())
+        f.write_str(self.message(&mut [0; Self::LONGEST]))
     }
 }
 
@@ -146,36 +167,24 @@ impl core::error::Error for AttachError {}
 #[cfg(feature = "defmt")]
 impl defmt::Format for AttachError {
     fn format(&self, f: defmt::Formatter<'_>) {
-        defmt::write!(f, "{=str}", self.message().as_str());
+        defmt::write!(f, "{=str}", self.message(&mut [0; Self::LONGEST]));
     }
 }
 
 /// A short text composed in `const` code.
 #[derive(Clone, Copy)]
-pub struct Message {
-    text: [u8; Self::CAPACITY],
+struct Message {
+    text: [u8; AttachError::LONGEST],
     length: usize,
 }
 
 impl Message {
-    const CAPACITY: usize = 144;
-
     const fn new() -> Self {
-        Self { text: [0; Self::CAPACITY], length: 0 }
-    }
-
-    /// Returns the text.
-    #[must_use]
-    pub const fn as_str(&self) -> &str {
-        let Some((text, _)) = self.text.split_at_checked(self.length) else { return "" };
-        match core::str::from_utf8(text) {
-            Ok(text) => text,
-            Err(_) => "",
-        }
+        Self { text: [0; AttachError::LONGEST], length: 0 }
     }
 
     const fn byte(mut self, byte: u8) -> Self {
-        if self.length < Self::CAPACITY {
+        if self.length < AttachError::LONGEST {
             #[expect(
                 clippy::indexing_slicing,
                 reason = "checked right above; get_mut is not const"
@@ -235,18 +244,6 @@ impl Message {
     }
 }
 
-impl core::fmt::Debug for Message {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        core::fmt::Debug::fmt(self.as_str(), f)
-    }
-}
-
-impl core::fmt::Display for Message {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(self.as_str())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -254,6 +251,10 @@ mod tests {
 
     const GM6020: MotorName = MotorName::new("GM6020 (current)", 1);
     const M3508: MotorName = MotorName::new("M3508", 5);
+
+    fn written(message: &Message) -> &str {
+        core::str::from_utf8(&message.text[..message.length]).unwrap()
+    }
 
     #[test]
     fn a_collision_names_both_motors_the_id_and_the_slot() {
@@ -272,11 +273,10 @@ mod tests {
     fn numbers_are_written_in_full() {
         for number in [0, 9, 10, 109, 1_000_000_000, u32::MAX] {
             let message = Message::new().number(number);
-            assert_eq!(message.to_string(), number.to_string());
-            assert_eq!(std::format!("{message:?}"), std::format!("{:?}", number.to_string()));
+            assert_eq!(written(&message), number.to_string());
         }
         for (number, text) in [(0x0A9, "0x0A9"), (0x2FF, "0x2FF"), (0, "0x000")] {
-            assert_eq!(Message::new().hex(number).to_string(), text);
+            assert_eq!(written(&Message::new().hex(number)), text);
         }
     }
 
@@ -317,6 +317,6 @@ mod tests {
     #[test]
     fn a_message_beyond_its_capacity_is_cut() {
         let long = core::str::from_utf8(&[b'x'; 200]).unwrap().to_string();
-        assert_eq!(Message::new().text(&long).as_str().len(), Message::CAPACITY);
+        assert_eq!(written(&Message::new().text(&long)).len(), AttachError::LONGEST);
     }
 }

@@ -36,18 +36,18 @@
 //! `attach` is a `const fn`: in a `const` the same refusal is a compile error, in words.
 //!
 //! ```compile_fail
-//! use drivetrain::dji::{Bus, Config, Gm6020Current, M3508};
+//! use drivetrain::dji::{AttachError, Bus, Config, Gm6020Current, M3508};
 //!
 //! const BUS: Bus = {
 //!     let mut bus = Bus::new();
 //!     match bus.attach(Config::<M3508>::new(5)) {
 //!         Ok(_) => {}
-//!         Err(error) => panic!("{}", error.message().as_str()),
+//!         Err(error) => panic!("{}", error.message(&mut [0; AttachError::LONGEST])),
 //!     }
 //!     match bus.attach(Config::<Gm6020Current>::new(1)) {
 //!         Ok(_) => {}
 //!         // error[E0080]: evaluation panicked: GM6020 (current) #1 collides with M3508 #5 on 0x205
-//!         Err(error) => panic!("{}", error.message().as_str()),
+//!         Err(error) => panic!("{}", error.message(&mut [0; AttachError::LONGEST])),
 //!     }
 //!     bus
 //! };
@@ -62,17 +62,17 @@
 //! The example above with a free id for the GM6020 compiles:
 //!
 //! ```
-//! use drivetrain::dji::{Bus, Config, Gm6020Current, M3508};
+//! use drivetrain::dji::{AttachError, Bus, Config, Gm6020Current, M3508};
 //!
 //! const BUS: Bus = {
 //!     let mut bus = Bus::new();
 //!     match bus.attach(Config::<M3508>::new(5)) {
 //!         Ok(_) => {}
-//!         Err(error) => panic!("{}", error.message().as_str()),
+//!         Err(error) => panic!("{}", error.message(&mut [0; AttachError::LONGEST])),
 //!     }
 //!     match bus.attach(Config::<Gm6020Current>::new(2)) {
 //!         Ok(_) => {}
-//!         Err(error) => panic!("{}", error.message().as_str()),
+//!         Err(error) => panic!("{}", error.message(&mut [0; AttachError::LONGEST])),
 //!     }
 //!     bus
 //! };
@@ -130,11 +130,11 @@
 //! [`Bus::scale_outputs`] scales the commands of an update by one factor, for instance to keep a power limit:
 //!
 //! ```
-//! use drivetrain::chassis::{PowerModel, WheelLoad};
+//! use drivetrain::chassis::PowerModel;
 //! use drivetrain::dji::{Bus, Config, M3508};
 //! use drivetrain::frame::CanFrame;
 //! use drivetrain::time::{Duration, Instant, Tick};
-//! use drivetrain::units::Current;
+//! use drivetrain::units::{AngularVelocity, Current};
 //!
 //! let mut bus = Bus::new();
 //! let at_once = |id| Config::<M3508>::new(id).with_opening(Duration::ZERO); // for one update
@@ -151,9 +151,9 @@
 //! bus.update(Tick::new(now, 0.001));
 //!
 //! let model = PowerModel::new(0.0, 0.475, 0.065, 0.0)?; // of current and speed
-//! let loads = wheels.map(|wheel| WheelLoad {
-//!     torque: bus.commanded_current(wheel).map_or(0.0, |current| current.as_amperes()),
-//!     speed_rad_s: bus.state(wheel).map_or(0.0, |state| state.velocity.as_rad_per_s()),
+//! let loads = wheels.map(|wheel| {
+//!     let current = bus.commanded_current(wheel).map_or(0.0, |current| current.as_amperes());
+//!     (current, bus.state(wheel).map_or(AngularVelocity::ZERO, |state| state.velocity))
 //! });
 //! let (scale, _) = model.cut(loads, 60.0); // both together would take 112 W
 //! bus.scale_outputs(wheels, scale);
@@ -186,7 +186,7 @@ mod watch;
 pub use bus::Bus;
 pub use codec::{ErrorCode, Feedback, State};
 pub use config::{Config, WordGains};
-pub use error::{AttachError, Message};
+pub use error::AttachError;
 pub use model::{Facts, Gm6020Current, Gm6020Voltage, M2006, M3508, Model};
 pub use motors::{AnyHandle, Handle};
 use outbox::CommandFrame;

@@ -100,7 +100,7 @@ impl<H: Copy, D: AngleDrive<H>> AngleDrive<H> for &mut D {
     }
 }
 
-/// The handle of a motor in a tuple of two to four owners: the owner, and the handle there.
+/// The handle of a motor in a tuple of two to four owners: the owner, and the handle there. Also the error of one of several parts.
 ///
 /// Tuples and arrays nest, so an owner in the tuple may be a tuple or an array itself.
 ///

@@ -6,7 +6,7 @@ use crate::control::Pid;
 use crate::error::ConfigError;
 use crate::motor::{
     ArmError, Capabilities, Capability, Condition, Conditions, Guard, Health, Link, MotorName,
-    Obstacles, Repeat, TargetError, VelocityDrive, Vitals, Watch,
+    Obstacles, OneOf, Repeat, TargetError, VelocityDrive, Vitals, Watch,
 };
 use crate::time::{Edge, Instant, Tick, TimeStep};
 use crate::units::AngularVelocity;
@@ -29,27 +29,6 @@ enum Way {
     Forward,
     Backward,
 }
-
-/// A failed pin.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum BrushedError<P, D> {
-    /// The PWM channel.
-    Pwm(P),
-    /// A direction pin.
-    Direction(D),
-}
-
-impl<P: core::fmt::Debug, D: core::fmt::Debug> core::fmt::Display for BrushedError<P, D> {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Pwm(error) => write!(f, "the PWM channel failed: {error:?}"),
-            Self::Direction(error) => write!(f, "a direction pin failed: {error:?}"),
-        }
-    }
-}
-
-impl<P: core::fmt::Debug, D: core::fmt::Debug> core::error::Error for BrushedError<P, D> {}
 
 /// Speed of a turning shaft when the no-load speed is not known, as a share of it: no stall, and never a runaway.
 const TURNS: f32 = 0.1;
@@ -210,8 +189,8 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     /// Runs the loop and sets the pins. Call this in every tick.
     ///
     /// # Errors
-    /// The error of a pin; the next call tries again.
-    pub fn update(&mut self, tick: Tick) -> Result<(), BrushedError<P::Error, D::Error>> {
+    /// The error of a pin, the first of the PWM channel, the second of a direction pin; the next call tries again.
+    pub fn update(&mut self, tick: Tick) -> Result<(), OneOf<P::Error, D::Error>> {
         let healthy = self.check(tick.now());
         let asked = self.command(tick);
         let limit = self.config.limit * healthy.min(self.guard.share());
@@ -232,7 +211,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
         }
         if way != self.way {
             // Never a pulse in the wrong direction while the pins change.
-            self.channel.set_duty_cycle_fully_off().map_err(BrushedError::Pwm)?;
+            self.channel.set_duty_cycle_fully_off().map_err(OneOf::First)?;
             // A failed pin may have changed or not: the next call sets both again.
             self.way = Way::Coast;
             let set = match way {
@@ -240,18 +219,18 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
                 Way::Forward => self.direction.forward(),
                 Way::Backward => self.direction.backward(),
             };
-            set.map_err(BrushedError::Direction)?;
+            set.map_err(OneOf::Second)?;
             self.way = way;
         }
         self.channel
             .set_duty_cycle(duty(share, self.channel.max_duty_cycle()))
-            .map_err(BrushedError::Pwm)
+            .map_err(OneOf::First)
     }
 
     /// Stops by both means, even if one of them fails.
-    fn coast(&mut self) -> Result<(), BrushedError<P::Error, D::Error>> {
-        let off = self.channel.set_duty_cycle_fully_off().map_err(BrushedError::Pwm);
-        let set = self.direction.coast().map_err(BrushedError::Direction);
+    fn coast(&mut self) -> Result<(), OneOf<P::Error, D::Error>> {
+        let off = self.channel.set_duty_cycle_fully_off().map_err(OneOf::First);
+        let set = self.direction.coast().map_err(OneOf::Second);
         self.way = Way::Coast;
         off.and(set)
     }

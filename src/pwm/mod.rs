@@ -12,11 +12,11 @@
 //!
 //! | item | meaning |
 //! |---|---|
-//! | [`RcPwm`], [`RcConfig`] | an ESC or servo that listens to the length of a pulse |
+//! | [`RcPwm`] | an ESC or servo that listens to the length of a pulse |
 //! | [`Brushed`], [`BrushedConfig`] | a DC motor with a bridge, and an encoder where it has one |
 //! | [`Direction`]: an array of one pin, or a tuple of two | how the bridge is told which way |
 //! | [`HealthConfig`](crate::motor::HealthConfig) | when a brushed motor with an encoder counts as stalled, or runs away |
-//! | [`BrushedError`] | which pin failed |
+//! | [`OneOf`](crate::motor::OneOf) | which pin failed: the PWM channel first, or a direction pin |
 //! | [`ConfigError`](crate::error::ConfigError) | fault of a configuration |
 //!
 //! The motors follow the rules of all motors here, by the same [`Guard`](crate::motor::Guard): disarmed at the start; a
@@ -39,8 +39,8 @@ mod tests;
 
 use embedded_hal::digital::{ErrorType, OutputPin};
 
-pub use brushed::{Brushed, BrushedConfig, BrushedError};
-pub use rc::{RcConfig, RcPwm};
+pub use brushed::{Brushed, BrushedConfig};
+pub use rc::RcPwm;
 
 /// The direction pins of a bridge: an array of one pin, or a tuple of two.
 ///

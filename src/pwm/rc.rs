@@ -10,140 +10,14 @@ use embedded_hal::pwm::SetDutyCycle;
 /// Nothing is integrated here.
 const ANY_STEP_S: f32 = f32::INFINITY;
 
-/// How an RC ESC or servo wants its pulses.
-///
-/// # Examples
-/// ```
-/// use drivetrain::pwm::RcConfig;
-/// use drivetrain::time::Duration;
-///
-/// // A fan that turns one way, on a 400 Hz timer.
-/// const FAN: RcConfig = RcConfig::new()
-///     .with_pulses_us(1_000, 1_000, 2_000)
-///     .with_period(Duration::from_micros(2_500));
-/// assert!(FAN.validate().is_ok());
-/// let wrong = FAN.with_pulses_us(1_000, 900, 2_000).validate();
-/// assert_eq!(wrong.map_err(|error| error.to_string()), Err("neutral pulse is not usable".into()));
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct RcConfig {
-    name: MotorName,
-    low_us: u16,
-    neutral_us: u16,
-    high_us: u16,
-    period_us: u64,
-    off_at_rest: bool,
-    arming: Duration,
-    full_speed: Option<AngularVelocity>,
-    timeouts: Timeouts,
-    opening: Duration,
-}
-
-impl RcConfig {
-    /// Pulses of 1000, 1500 and 2000 µs every 20 ms, neutral when idle and for 2 s when arming.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self {
-            name: MotorName::new("RC PWM", 1),
-            low_us: 1_000,
-            neutral_us: 1_500,
-            high_us: 2_000,
-            period_us: 20_000,
-            off_at_rest: false,
-            arming: Duration::from_secs(2),
-            full_speed: None,
-            timeouts: Timeouts::new(),
-            opening: OPENING,
-        }
-    }
-
-    /// Sets the number of the motor in edges; 1 at first.
-    #[must_use]
-    pub const fn with_id(self, id: u8) -> Self {
-        Self { name: MotorName::new("RC PWM", id), ..self }
-    }
-
-    /// Sets the pulses for throttle -1, 0 and 1, in µs. For an ESC with one direction only, `low` is the neutral pulse.
-    #[must_use]
-    pub const fn with_pulses_us(self, low: u16, neutral: u16, high: u16) -> Self {
-        Self { low_us: low, neutral_us: neutral, high_us: high, ..self }
-    }
-
-    /// Sets the period of the timer: 20 ms at first.
-    #[must_use]
-    pub const fn with_period(self, period: Duration) -> Self {
-        Self { period_us: period.as_micros(), ..self }
-    }
-
-    /// Sends no pulse, instead of the neutral pulse, for a motor at rest: a servo goes limp.
-    ///
-    /// Not for an ESC: most disarm then, and would have to see neutral again. With the neutral pulse an ESC stops and stays
-    /// armed, and a servo goes to its centre.
-    #[must_use]
-    pub const fn with_off_at_rest(self) -> Self {
-        Self { off_at_rest: true, ..self }
-    }
-
-    /// Sets how long the neutral pulse is sent before targets are taken, as required by the ESC. 2 s at first, counted
-    /// from the first pulse taken by the channel.
-    #[must_use]
-    pub const fn with_arming_time(self, time: Duration) -> Self {
-        Self { arming: time, ..self }
-    }
-
-    /// Sets the velocity at full throttle, so that velocities are valid targets. The velocity is not measured.
-    #[must_use]
-    pub const fn with_full_speed(self, velocity: AngularVelocity) -> Self {
-        Self { full_speed: Some(velocity), ..self }
-    }
-
-    /// Sets when a target counts as lost.
-    #[must_use]
-    pub const fn with_timeouts(self, timeouts: Timeouts) -> Self {
-        Self { timeouts, ..self }
-    }
-
-    /// Sets the time in which the pulse may leave neutral after arming, from not at all to the whole way; 0.2 s at first.
-    #[must_use]
-    pub const fn with_opening(self, time: Duration) -> Self {
-        Self { opening: time, ..self }
-    }
-
-    /// Checks every parameter.
-    ///
-    /// # Errors
-    /// Names the first invalid parameter.
-    pub fn validate(&self) -> Result<(), ConfigError> {
-        let speed = self.full_speed.map(AngularVelocity::as_rad_per_s);
-        Err(ConfigError::Unusable(if self.low_us == 0 || self.low_us >= self.high_us {
-            "low pulse"
-        } else if self.neutral_us < self.low_us || self.neutral_us > self.high_us {
-            "neutral pulse"
-        } else if u64::from(self.high_us) > self.period_us {
-            "period"
-        } else if speed.is_some_and(|speed| !(speed.is_finite() && speed > 0.0)) {
-            "full speed"
-        } else {
-            return Ok(());
-        }))
-    }
-}
-
-impl Default for RcConfig {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-/// An RC ESC or servo on a PWM channel whose timer runs at the period of the configuration.
+/// An RC ESC or servo on a PWM channel.
 ///
 /// The motor sends no feedback, so feedback cannot be missing; the motion is up to the ESC.
 ///
 /// # Examples
 /// ```
-/// use drivetrain::pwm::{RcConfig, RcPwm};
-/// use drivetrain::time::{Instant, Tick};
+/// use drivetrain::pwm::RcPwm;
+/// use drivetrain::time::{Duration, Instant, Tick};
 /// # use embedded_hal::pwm::*;
 /// # struct Channel(u16);
 /// # impl ErrorType for Channel { type Error = core::convert::Infallible; }
@@ -153,7 +27,7 @@ impl Default for RcConfig {
 /// # }
 /// # let channel = Channel(0); // counts microseconds of 20 ms
 ///
-/// let mut esc = RcPwm::new(channel, RcConfig::new())?;
+/// let mut esc = RcPwm::new(channel);
 /// let at_ms = |ms: u64| Tick::new(Instant::from_micros(ms * 1_000), 0.001);
 /// esc.arm()?;
 /// for ms in 0..=2_000 {
@@ -164,13 +38,23 @@ impl Default for RcConfig {
 ///     esc.update(at_ms(ms))?;
 /// }
 /// assert_eq!(esc.channel().0, 1_750);
+///
+/// // A fan that turns one way, on a timer of 400 Hz.
+/// let fan = esc.with_pulses_us([1_000, 1_000, 2_000], Duration::from_micros(2_500))?;
+/// let wrong = fan.with_pulses_us([1_000, 900, 2_000], Duration::from_micros(2_500));
+/// assert_eq!(wrong.map(|_| ()).map_err(|error| error.to_string()), Err("neutral pulse is not usable".into()));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug)]
 pub struct RcPwm<P> {
     channel: P,
-    config: RcConfig,
     guard: Guard,
+    name: MotorName,
+    pulses_us: [u16; 3],
+    period_us: u64,
+    off_at_rest: bool,
+    arming_time: Duration,
+    full_speed: Option<AngularVelocity>,
     arming: Arming,
     throttle: f32,
     may_repeat: Repeat,
@@ -188,22 +72,88 @@ enum Arming {
 }
 
 impl<P: SetDutyCycle> RcPwm<P> {
-    /// Takes a channel: disarmed. Nothing is sent before the first [`update`](Self::update).
-    ///
-    /// # Errors
-    /// Names the invalid parameter.
-    pub fn new(channel: P, config: RcConfig) -> Result<Self, ConfigError> {
-        config.validate()?;
-        let guard =
-            Guard::without_feedback().with_timeouts(config.timeouts).with_opening(config.opening);
-        Ok(Self {
+    /// Takes a channel: disarmed, with pulses of 1000, 1500 and 2000 µs every 20 ms, neutral when idle and for 2 s when arming.
+    /// Nothing is sent before the first [`update`](Self::update).
+    #[must_use]
+    pub const fn new(channel: P) -> Self {
+        Self {
             channel,
-            config,
-            guard,
+            guard: Guard::without_feedback().with_opening(OPENING),
+            name: MotorName::new("RC PWM", 1),
+            pulses_us: [1_000, 1_500, 2_000],
+            period_us: 20_000,
+            off_at_rest: false,
+            arming_time: Duration::from_secs(2),
+            full_speed: None,
             arming: Arming::Idle,
             throttle: 0.0,
             may_repeat: Repeat::ONCE,
-        })
+        }
+    }
+
+    /// Sets the number of the motor in edges; 1 at first.
+    #[must_use]
+    pub fn with_id(self, id: u8) -> Self {
+        Self { name: MotorName::new("RC PWM", id), ..self }
+    }
+
+    /// Sets the pulses for throttle -1, 0 and 1 in µs, and the period of the timer. For an ESC with one direction only, the first pulse is
+    /// the neutral pulse.
+    ///
+    /// # Errors
+    /// Names the first pulse that is not usable, or the period that is shorter than the last pulse.
+    pub fn with_pulses_us(self, pulses: [u16; 3], period: Duration) -> Result<Self, ConfigError> {
+        let [low, neutral, high] = pulses;
+        let period_us = period.as_micros();
+        Err(ConfigError::Unusable(if low == 0 || low >= high {
+            "low pulse"
+        } else if neutral < low || neutral > high {
+            "neutral pulse"
+        } else if u64::from(high) > period_us {
+            "period"
+        } else {
+            return Ok(Self { pulses_us: pulses, period_us, ..self });
+        }))
+    }
+
+    /// Sends no pulse, instead of the neutral pulse, for a motor at rest: a servo goes limp.
+    ///
+    /// Not for an ESC: most disarm then, and would have to see neutral again. With the neutral pulse an ESC stops and stays
+    /// armed, and a servo goes to its centre.
+    #[must_use]
+    pub fn with_off_at_rest(self) -> Self {
+        Self { off_at_rest: true, ..self }
+    }
+
+    /// Sets how long the neutral pulse is sent before targets are taken, as required by the ESC. 2 s at first, counted
+    /// from the first pulse taken by the channel.
+    #[must_use]
+    pub fn with_arming_time(self, time: Duration) -> Self {
+        Self { arming_time: time, ..self }
+    }
+
+    /// Sets the velocity at full throttle, so that velocities are valid targets. The velocity is not measured.
+    ///
+    /// # Errors
+    /// Names the velocity when NaN, infinite, zero or negative.
+    pub fn with_full_speed(self, velocity: AngularVelocity) -> Result<Self, ConfigError> {
+        if velocity.is_finite() && velocity > AngularVelocity::ZERO {
+            Ok(Self { full_speed: Some(velocity), ..self })
+        } else {
+            Err(ConfigError::Unusable("full speed"))
+        }
+    }
+
+    /// Sets when a target counts as lost.
+    #[must_use]
+    pub fn with_timeouts(self, timeouts: Timeouts) -> Self {
+        Self { guard: self.guard.with_timeouts(timeouts), ..self }
+    }
+
+    /// Sets the time in which the pulse may leave neutral after arming, from not at all to the whole way; 0.2 s at first.
+    #[must_use]
+    pub fn with_opening(self, time: Duration) -> Self {
+        Self { guard: self.guard.with_opening(time), ..self }
     }
 
     /// Begins to arm: the updates send neutral for the configured time, and targets are taken then. Without effect while
@@ -274,38 +224,42 @@ impl<P: SetDutyCycle> RcPwm<P> {
         if drives && may_act {
             let pulse_us = self.pulse_us();
             self.send(pulse_us)
-        } else if self.config.off_at_rest {
+        } else if self.off_at_rest {
             self.channel.set_duty_cycle_fully_off()
         } else {
-            self.send(self.config.neutral_us.into())
+            self.send(self.neutral_us().into())
         }
     }
 
     /// Sends neutral. A pulse refused by the channel does not count.
     fn go_on_arming(&mut self, now: Instant) -> Result<(), P::Error> {
-        self.send(self.config.neutral_us.into())?;
+        self.send(self.neutral_us().into())?;
         let since = match self.arming {
             Arming::Since(since) => since,
             Arming::Idle | Arming::Asked => now,
         };
         self.arming = Arming::Since(since);
-        if now.since(since) >= self.config.arming {
+        if now.since(since) >= self.arming_time {
             self.arming = Arming::Idle;
             self.guard.engage(now);
         }
         Ok(())
     }
 
+    const fn neutral_us(&self) -> u16 {
+        let [_, neutral, _] = self.pulses_us;
+        neutral
+    }
+
     fn pulse_us(&mut self) -> f32 {
         let open = self.guard.share();
-        let RcConfig { low_us, neutral_us, high_us, .. } = self.config;
-        let [low, neutral, high] = [low_us, neutral_us, high_us].map(f32::from);
+        let [low, neutral, high] = self.pulses_us.map(f32::from);
         let reach = if self.throttle < 0.0 { neutral - low } else { high - neutral };
         neutral + self.throttle.max(-open).min(open) * reach
     }
 
     fn send(&mut self, pulse_us: f32) -> Result<(), P::Error> {
-        let share = pulse_us / self.config.period_us as f32;
+        let share = pulse_us / self.period_us as f32;
         self.channel.set_duty_cycle(duty(share, self.channel.max_duty_cycle()))
     }
 
@@ -318,13 +272,13 @@ impl<P: SetDutyCycle> RcPwm<P> {
     /// Returns the health of the motor.
     #[must_use]
     pub const fn health(&self) -> Health {
-        self.guard.health(self.config.name)
+        self.guard.health(self.name)
     }
 
     /// Returns the oldest unread edge. No edge is lost, however late the reading; while an edge waits, the same change
     /// is not noted again.
     pub fn next_edge(&mut self) -> Option<Edge<Condition, MotorName>> {
-        self.guard.next_edge(self.config.name)
+        self.guard.next_edge(self.name)
     }
 
     /// Returns the channel.
@@ -351,7 +305,7 @@ pub(super) fn duty(share: f32, max: u16) -> u16 {
     duty.min(max)
 }
 
-/// Open loop, over [`RcConfig::with_full_speed`]: the velocity is asked for and not measured.
+/// Open loop, over [`RcPwm::with_full_speed`]: the velocity is asked for and not measured.
 impl<P: SetDutyCycle> VelocityDrive<()> for RcPwm<P> {
     /// Always `None`.
     fn velocity(&self, (): ()) -> Option<AngularVelocity> {
@@ -360,11 +314,11 @@ impl<P: SetDutyCycle> VelocityDrive<()> for RcPwm<P> {
 
     fn capabilities(&self, (): ()) -> Capabilities {
         let set = Capabilities::of(&[Capability::Raw]);
-        if self.config.full_speed.is_some() { set.with(Capability::Velocity) } else { set }
+        if self.full_speed.is_some() { set.with(Capability::Velocity) } else { set }
     }
 
     fn set_velocity(&mut self, (): (), target: AngularVelocity) -> Result<(), TargetError> {
-        let full = self.config.full_speed.ok_or(TargetError::Unsupported)?;
+        let full = self.full_speed.ok_or(TargetError::Unsupported)?;
         self.set_throttle(target.as_rad_per_s() / full.as_rad_per_s())
     }
 }

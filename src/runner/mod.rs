@@ -58,7 +58,8 @@ const FRAMES_A_READING: usize = 16;
 /// ```
 /// use drivetrain::dji::{Bus, Config, M3508};
 /// use drivetrain::runner::{Nb, Runner};
-/// use drivetrain::time::{Duration, Instant, ManualClock};
+/// use core::cell::Cell;
+/// use drivetrain::time::{Duration, Instant};
 /// # use drivetrain::frame::CanFrame;
 /// # struct Loopback(Option<CanFrame>);
 /// # impl embedded_can::nb::Can for Loopback {
@@ -69,12 +70,12 @@ const FRAMES_A_READING: usize = 16;
 /// # }
 /// # let can = Loopback(None);
 ///
-/// let clock = ManualClock::new(Instant::START);
+/// let clock = Cell::new(Instant::START);
 /// let mut bus = Bus::new();
 /// bus.attach(Config::<M3508>::new(1))?;
 /// let mut runner = Runner::new(Nb(can), &clock, bus);
 /// for _ in 0..20 {
-///     clock.advance(Duration::from_millis(1));
+///     clock.set(clock.get() + Duration::from_millis(1));
 ///     runner.poll(16);
 ///     if let Some(tick) = runner.due() {
 ///         runner.tick(tick);

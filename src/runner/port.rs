@@ -331,7 +331,8 @@ mod tests {
     use super::*;
     use crate::dji::{Bus, Config, M3508};
     use crate::runner::Runner;
-    use crate::time::{Instant, ManualClock, Tick};
+    use crate::time::{Instant, Tick};
+    use core::cell::Cell;
     use embedded_can::{Frame, Id};
     use std::vec::Vec;
 
@@ -383,12 +384,12 @@ mod tests {
     #[test]
     fn an_evicted_frame_of_others_is_counted_even_if_too_long_to_be_handed_back() {
         for (length, handed_back) in [(8, 1), (12, 0), (64, 0)] {
-            let clock = ManualClock::new(Instant::from_micros(1_000));
+            let clock = Cell::new(Instant::from_micros(1_000));
             let mut bus = Bus::new();
             bus.attach(Config::<M3508>::new(1)).unwrap();
             let mut runner = Runner::new(Nb(Full { length }), &clock, bus);
             let mut evicted = 0;
-            runner.tick_with(Tick::new(clock.now(), 0.001), |_| evicted += 1);
+            runner.tick_with(Tick::new(clock.get(), 0.001), |_| evicted += 1);
             let s = runner.statistics();
             assert_eq!((s.sent, s.evicted_unrelated, s.evicted), (1, 1, 0), "{length}");
             assert_eq!(evicted, handed_back, "{length}");
@@ -416,20 +417,20 @@ mod tests {
     #[test]
     fn a_frame_of_another_kind_does_not_change_the_time_of_the_frames_after() {
         for place in [0, 1, 8, 16] {
-            let clock = ManualClock::new(Instant::from_micros(10_000_000));
+            let clock = Cell::new(Instant::from_micros(10_000_000));
             let mut bus = Bus::new();
             let wheel = bus.attach(Config::<M3508>::at_once(1)).unwrap();
-            _ = bus.ingest_raw(0x201, &[0; 8], clock.now());
-            bus.arm(clock.now()).unwrap();
-            bus.update(Tick::new(clock.now(), 0.001));
-            clock.advance(crate::time::Duration::from_millis(1));
+            _ = bus.ingest_raw(0x201, &[0; 8], clock.get());
+            bus.arm(clock.get()).unwrap();
+            bus.update(Tick::new(clock.get(), 0.001));
+            clock.set(clock.get() + crate::time::Duration::from_millis(1));
             let mut lengths = std::vec![8; 18];
             lengths[17 - place] = 12;
             let mut runner = Runner::new(Nb(Lengths(lengths)), &clock, bus);
             assert_eq!(runner.poll(64), 18);
             let s = runner.statistics();
             assert_eq!((s.received, s.taken, s.unrelated), (18, 17, 1), "{place}");
-            runner.tick(Tick::new(clock.now(), 0.001));
+            runner.tick(Tick::new(clock.get(), 0.001));
             let bus = runner.device();
             assert!(bus.is_motor_armed(wheel), "{place}");
             assert_eq!(bus.link(wheel), Some(crate::motor::Link::Online), "{place}");

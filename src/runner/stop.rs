@@ -70,7 +70,8 @@ pub trait AbortPending: embedded_can::nb::Can {
 /// use drivetrain::dji::{Bus, Config, M3508};
 /// use drivetrain::frame::CanFrame;
 /// use drivetrain::runner::{AbortPending, Nb, NbAbort, Runner};
-/// use drivetrain::time::{Duration, Instant, ManualClock};
+/// use core::cell::Cell;
+/// use drivetrain::time::{Duration, Instant};
 /// # use embedded_can::ErrorKind;
 ///
 /// /// A controller whose plug is out: nothing ever leaves.
@@ -92,12 +93,12 @@ pub trait AbortPending: embedded_can::nb::Can {
 ///     }
 /// }
 ///
-/// let clock = ManualClock::new(Instant::START);
+/// let clock = Cell::new(Instant::START);
 /// let mut bus = Bus::new();
 /// bus.attach(Config::<M3508>::new(1))?;
 /// let mut runner = Runner::new(NbAbort(Nb(Unplugged::default())), &clock, bus);
 /// for _ in 0..5 {
-///     clock.advance(Duration::from_millis(1));
+///     clock.set(clock.get() + Duration::from_millis(1));
 ///     runner.poll(16);
 ///     if let Some(tick) = runner.due() {
 ///         runner.tick(tick);
@@ -133,8 +134,9 @@ mod tests {
     use super::*;
     use crate::dji::{Bus, Config, M3508};
     use crate::runner::Runner;
-    use crate::time::{Duration, Instant, ManualClock, Tick};
+    use crate::time::{Duration, Instant, Tick};
     use crate::units::Current;
+    use core::cell::Cell;
     use embedded_can::ErrorKind;
     use std::vec::Vec;
 
@@ -191,14 +193,14 @@ mod tests {
         mailboxes: impl Fn(&mut P) -> &mut Mailboxes,
         out_ms: u64,
     ) -> (Vec<i16>, Option<u64>) {
-        let clock = ManualClock::new(Instant::START);
+        let clock = Cell::new(Instant::START);
         let mut bus = Bus::new();
         let wheel = bus.attach(Config::<M3508>::at_once(1)).unwrap();
         let mut runner =
             Runner::new(port(Mailboxes { is_plugged: true, ..Mailboxes::default() }), &clock, bus);
         let mut down = None;
         for ms in 1..=20 + out_ms {
-            clock.advance(Duration::from_millis(1));
+            clock.set(clock.get() + Duration::from_millis(1));
             mailboxes(runner.port_mut()).is_plugged = ms < 20;
             mailboxes(runner.port_mut()).run();
             runner.poll(8);
@@ -247,7 +249,7 @@ mod tests {
 
     #[test]
     fn frames_of_others_that_are_called_back_are_handed_over() {
-        let clock = ManualClock::new(Instant::START);
+        let clock = Cell::new(Instant::START);
         let mut runner = Runner::new(NbAbort(Nb(Mailboxes::default())), &clock, Bus::new());
         embedded_can::nb::Can::transmit(&mut runner.port_mut().0.0, &frame(0x123, [7; 8])).unwrap();
         let mut others = Vec::new();

@@ -27,17 +27,18 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// ```
     /// use drivetrain::dji::Bus;
     /// use drivetrain::runner::{Nb, Runner};
-    /// use drivetrain::time::{Duration, Instant, ManualClock};
+    /// use core::cell::Cell;
+    /// use drivetrain::time::{Duration, Instant};
     /// # use drivetrain::sim::Simulation;
     /// # let world = Simulation::new(1);
     /// # let can = world.controller();
     ///
-    /// let clock = ManualClock::new(Instant::START);
+    /// let clock = Cell::new(Instant::START);
     /// let mut runner = Runner::new(Nb(can), &clock, Bus::new())
     ///     .with_period(Duration::from_millis(10))
     ///     .with_standstill_after(20);
     /// for _ in 0..100 {
-    ///     clock.advance(Duration::from_millis(10));
+    ///     clock.set(clock.get() + Duration::from_millis(10));
     ///     if let Some(tick) = runner.due() {
     ///         runner.tick(tick);
     ///     }
@@ -112,12 +113,13 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// use drivetrain::dji::{Bus, Config, M3508};
     /// use drivetrain::frame::CanFrame;
     /// use drivetrain::runner::{BusCondition, FrameQueue, Nb, Runner};
-    /// use drivetrain::time::{Instant, ManualClock};
+    /// use core::cell::Cell;
+    /// use drivetrain::time::Instant;
     /// # use drivetrain::sim::Simulation;
     /// # let world = Simulation::new(1);
     /// # let can = world.controller();
     ///
-    /// let clock = ManualClock::new(Instant::from_micros(9));
+    /// let clock = Cell::new(Instant::from_micros(9));
     /// let mut bus = Bus::new();
     /// bus.attach(Config::<M3508>::new(1))?;
     /// let mut runner = Runner::new(Nb(can), &clock, bus);
@@ -241,20 +243,21 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// ```
     /// use drivetrain::dji::Bus;
     /// use drivetrain::runner::{Nb, Runner};
-    /// use drivetrain::time::{Duration, Instant, ManualClock};
+    /// use core::cell::Cell;
+    /// use drivetrain::time::{Duration, Instant};
     /// # use drivetrain::sim::Simulation;
     /// # let world = Simulation::new(1);
     /// # let can = world.controller();
     ///
-    /// let clock = ManualClock::new(Instant::START);
+    /// let clock = Cell::new(Instant::START);
     /// let mut runner = Runner::new(Nb(can), &clock, Bus::new());
     /// runner.due();
-    /// clock.advance(Duration::from_secs(1));
+    /// clock.set(clock.get() + Duration::from_secs(1));
     /// for _ in 0..=1_000 {
     ///     if let Some(tick) = runner.due() {
     ///         runner.tick(tick);
     ///     }
-    ///     clock.advance(Duration::from_millis(1));
+    ///     clock.set(clock.get() + Duration::from_millis(1));
     /// }
     /// let log: Vec<String> = core::iter::from_fn(|| runner.next_edge()).map(|edge| edge.to_string()).collect();
     /// assert_eq!(log, ["tick overrun began at 1000000 us", "tick overrun ended at 2000000 us"]);
@@ -280,7 +283,8 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// ```
     /// use drivetrain::dji::Bus;
     /// use drivetrain::runner::{Nb, Runner};
-    /// use drivetrain::time::{Duration, Instant, ManualClock};
+    /// use core::cell::Cell;
+    /// use drivetrain::time::{Duration, Instant};
     /// # use drivetrain::sim::Simulation;
     /// # let world = Simulation::new(1);
     /// # let can = world.controller();
@@ -288,7 +292,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// # impl Watchdog { fn feed(&mut self) { self.fed += 1; } }
     /// # let mut watchdog = Watchdog { fed: 0 }; // independent, with a time-out of some ticks
     ///
-    /// let clock = ManualClock::new(Instant::START);
+    /// let clock = Cell::new(Instant::START);
     /// let mut runner = Runner::new(Nb(can), &clock, Bus::new());
     /// let mut beat = runner.heartbeat();
     /// for _ in 0..100 {
@@ -300,7 +304,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     ///         beat = runner.heartbeat();
     ///         watchdog.feed();
     ///     }
-    ///     clock.advance(Duration::from_micros(100));
+    ///     clock.set(clock.get() + Duration::from_micros(100));
     /// }
     /// assert_eq!(watchdog.fed, 10); // once a tick
     /// ```

@@ -2,7 +2,7 @@ use super::MotorKey;
 use super::body::{Body, Contact, Rolling, Velocity};
 use super::esc::Esc;
 use super::motor::MOTORS;
-use crate::geometry::{self, Rotation2, Twist, Vec2};
+use crate::geometry::{self, Pose2, Rotation2, Twist, Vec2, World};
 use crate::units::Angle;
 
 /// A chassis to attach to a [`Simulation`](super::Simulation): a rigid body on wheels of any layout, all with slip.
@@ -36,8 +36,8 @@ use crate::units::Angle;
 /// let forward = CanFrame::standard(0x200, [0xF9, 0x9A, 6, 0x66, 6, 0x66, 0xF9, 0x9A]).ok_or("id")?;
 /// world.controller().transmit(&forward).map_err(|_| "refused")?;
 /// world.advance(Duration::from_millis(500));
-/// let state = world.chassis().ok_or("no chassis")?;
-/// assert!(state.twist.vx_m_s > 0.4 && state.twist.vy_m_s.abs() < 0.01);
+/// let (pose, twist) = world.chassis().ok_or("no chassis")?;
+/// assert!(twist.vx_m_s > 0.4 && twist.vy_m_s.abs() < 0.01 && pose.x_m > 0.1);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -110,23 +110,6 @@ impl ChassisConfig {
     }
 }
 
-/// True pose and motion of a simulated chassis.
-///
-/// The chassis starts at the origin, facing along the world's x axis.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct ChassisState {
-    /// Along the world's x axis, in m.
-    pub x_m: f64,
-    /// Along the world's y axis, in m.
-    pub y_m: f64,
-    /// Counter-clockwise from the world's x axis, in rad, not reduced to one turn.
-    pub heading_rad: f64,
-    /// Velocity in the body's frame.
-    pub twist: Twist<geometry::Body>,
-}
-
 /// A chassis in a world: its body and its wheels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Chassis {
@@ -192,10 +175,12 @@ impl Chassis {
         ground_nm
     }
 
-    pub(crate) fn state(&self) -> ChassisState {
+    #[expect(clippy::cast_possible_truncation, reason = "some metres and radians")]
+    pub(crate) fn state(&self) -> (Pose2<World>, Twist<geometry::Body>) {
         let (x_m, y_m, heading_rad) = self.body.pose();
         let Velocity { vx, vy, wz } = self.body.velocity_body();
-        ChassisState { x_m, y_m, heading_rad, twist: Twist::new(vx, vy, wz) }
+        let pose = Pose2::new(x_m as f32, y_m as f32, Angle::from_radians(heading_rad as f32));
+        (pose, Twist::new(vx, vy, wz))
     }
 }
 
@@ -428,9 +413,9 @@ mod tests {
         world.attach_chassis(ChassisConfig::new(&four(MotorKey::new(15).unwrap()))).unwrap();
         world.push_chassis(0.0, 1_000.0, f32::NAN);
         world.advance(Duration::from_millis(100));
-        let state = world.chassis().unwrap();
-        assert!(state.y_m > 0.1 && state.x_m.abs() < 1e-3, "{state:?}");
-        assert!(state.twist.wz_rad_s.abs() < 1e-3);
+        let (pose, twist) = world.chassis().unwrap();
+        assert!(pose.y_m > 0.1 && pose.x_m.abs() < 1e-3, "{pose:?}");
+        assert!(twist.wz_rad_s.abs() < 1e-3);
     }
 
     fn amperes(world: &Simulation, per_slot: [i16; 4]) {
@@ -458,7 +443,7 @@ mod tests {
         // Twice 1.5 Nm less friction, on 20 kg and the wheels.
         let (torque, mass) = (2.0 * (1.5 - 0.14), 20.0 + 2.0 * 8e-3 / (0.076 * 0.076));
         let expected = torque / 0.076 / mass * 0.5;
-        let twist = world.chassis().unwrap().twist;
+        let (_, twist) = world.chassis().unwrap();
         assert!((twist.vx_m_s / expected - 1.0).abs() < 0.05, "{twist:?} and not {expected}");
         assert!(twist.vy_m_s.abs() < 1e-3 && twist.wz_rad_s.abs() < 1e-3);
     }
@@ -476,7 +461,7 @@ mod tests {
         let modules = [(1, 0.2), (2, -0.2)].map(|(id, x)| wheel(id, x, 0.1));
         world.attach_chassis(ChassisConfig::new(&modules)).unwrap();
         amperes(&world, [2, 2, 0, 0]);
-        let twist = world.chassis().unwrap().twist;
+        let (_, twist) = world.chassis().unwrap();
         assert!(twist.vx_m_s > 0.1 && (twist.vx_m_s - twist.vy_m_s).abs() < 0.01, "{twist:?}");
     }
 }

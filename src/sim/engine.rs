@@ -7,6 +7,7 @@ use super::line::{Ring, Sender, Transmission, Wire};
 use super::motor::{JOINTS, MOTORS, MotorConfig, MotorState};
 use super::{Fault, JointConfig, Line, MotorKey, SimError};
 use crate::frame::CanFrame;
+use crate::time::Duration;
 use embedded_can::Frame;
 
 /// The step of the motors and of the chassis.
@@ -106,6 +107,13 @@ impl Engine {
         *self.joints.get_mut(index).ok_or(refused)? = Some(drive);
         self.joint_count += 1;
         Ok(key)
+    }
+
+    pub(crate) fn set_latency(&mut self, key: MotorKey, latency: Duration) {
+        let joint = key.joint_index().and_then(|index| self.joints.get_mut(index)?.as_mut());
+        if let Some(joint) = joint {
+            joint.config.latency = latency;
+        }
     }
 
     pub(crate) fn esc_mut(&mut self, key: MotorKey) -> Option<&mut Esc> {

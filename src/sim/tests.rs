@@ -1,5 +1,5 @@
 use super::motor::Model;
-use super::{JointConfig, Sender, *};
+use super::{Sender, *};
 use embedded_can::Frame;
 use embedded_can::nb::Can;
 use std::string::{String, ToString};
@@ -116,7 +116,7 @@ fn a_full_world_refuses_the_seventeenth_motor() {
 fn the_angle_of_the_shaft_is_what_its_encoder_counts() {
     let world = Simulation::new(1);
     let wheel = world.attach(m3508(1).with_rotor_angle(4_096)).unwrap();
-    let joint = world.attach_joint(JointConfig::new(1).with_position(-16_384)).unwrap();
+    let joint = world.attach_joint(Line::Can1, 1, Some(-16_384)).unwrap();
     let state = |key| world.motor(key).unwrap();
     let gear = m3508(1).facts().gear.as_f32();
     assert!((state(wheel).position.as_turns() * gear - 0.5).abs() < 1e-6);
@@ -147,7 +147,7 @@ fn a_drive_that_lost_its_angle_counts_from_the_present_angle() {
 #[test]
 fn a_joint_has_no_fault_of_an_esc() {
     let world = Simulation::new(1);
-    let joint = world.attach_joint(JointConfig::new(1)).unwrap();
+    let joint = world.attach_joint(Line::Can1, 1, None).unwrap();
     for fault in [
         Fault::StuckEncoder(joint),
         Fault::FrozenFeedback(joint),

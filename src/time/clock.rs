@@ -1,6 +1,6 @@
-//! Clocks: the trait, a clock set by hand, and the extension of a hardware counter.
+//! Clocks: the trait, also of a cell set by hand, and the extension of a hardware counter.
 
-use super::{Duration, Instant};
+use super::Instant;
 use crate::error::ConfigError;
 use core::cell::Cell;
 use core::num::NonZeroU32;
@@ -10,7 +10,7 @@ use core::num::NonZeroU32;
 /// An implementation must never go back and must not stand still while the loop runs; a step of one microsecond is the
 /// resolution of the crate. A reading that goes back counts as no time passed.
 ///
-/// Any closure `FnMut() -> Instant` is a clock.
+/// Any closure `FnMut() -> Instant` is a clock, and so is `&Cell<Instant>`: a test sets the cell, and the tested object reads it.
 ///
 /// # Examples
 /// ```
@@ -23,6 +23,11 @@ use core::num::NonZeroU32;
 /// };
 /// assert_eq!(clock.now(), Instant::from_micros(10));
 /// assert_eq!(clock.now(), Instant::from_micros(20));
+///
+/// let by_hand = core::cell::Cell::new(Instant::from_micros(5));
+/// let mut shared = &by_hand;
+/// by_hand.set(Instant::from_micros(3_000));
+/// assert_eq!(Clock::now(&mut shared), Instant::from_micros(3_000));
 /// ```
 pub trait Clock {
     /// Reads the time.
@@ -35,47 +40,10 @@ impl<F: FnMut() -> Instant> Clock for F {
     }
 }
 
-/// A clock that stands until moved: share it by reference between a test and the tested object.
-///
-/// # Examples
-/// ```
-/// use drivetrain::time::{Clock, Duration, Instant, ManualClock};
-///
-/// let clock = ManualClock::new(Instant::START);
-/// let mut shared = &clock;
-/// clock.advance(Duration::from_millis(3));
-/// assert_eq!(shared.now(), Instant::from_micros(3_000));
-/// ```
-#[derive(Debug, Default)]
-pub struct ManualClock(Cell<Instant>);
-
-impl ManualClock {
-    /// Starts at `now`.
-    #[must_use]
-    pub const fn new(now: Instant) -> Self {
-        Self(Cell::new(now))
-    }
-
-    /// Reads the time.
-    #[must_use]
-    pub fn now(&self) -> Instant {
-        self.0.get()
-    }
-
-    /// Moves the time forward.
-    pub fn advance(&self, duration: Duration) {
-        self.set(self.now() + duration);
-    }
-
-    /// Sets the time, also backward, as a fault to test.
-    pub fn set(&self, now: Instant) {
-        self.0.set(now);
-    }
-}
-
-impl Clock for &ManualClock {
+/// A clock that stands until set, also backward, as a fault to test.
+impl Clock for &Cell<Instant> {
     fn now(&mut self) -> Instant {
-        ManualClock::now(self)
+        self.get()
     }
 }
 
@@ -93,7 +61,7 @@ impl Clock for &ManualClock {
 #[cfg(feature = "std")]
 impl Clock for std::time::Instant {
     fn now(&mut self) -> Instant {
-        Instant::START + Duration::from(self.elapsed())
+        Instant::START + super::Duration::from(self.elapsed())
     }
 }
 

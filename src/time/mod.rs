@@ -3,8 +3,7 @@
 //! | item | meaning |
 //! |---|---|
 //! | [`Instant`], [`Duration`] | microseconds in 64 bits; they never wrap |
-//! | [`Clock`] | the source of `now`, used by the runner only |
-//! | [`ManualClock`] | a clock that a test moves by hand |
+//! | [`Clock`] | the source of `now`, used by the runner only; in a test, a `&Cell<Instant>` set by hand |
 //! | [`ExtendedCounter`] | a 16- or 32-bit hardware counter, extended to an [`Instant`] |
 //! | [`Ticker`], [`Tick`] | the cadence of the control loop, without drift, overruns counted |
 //! | [`TimeStep`] | the step of a tick, validated once for all loops |
@@ -24,7 +23,7 @@ mod clock;
 mod instant;
 mod ticker;
 
-pub use clock::{Clock, ExtendedCounter, ManualClock};
+pub use clock::{Clock, ExtendedCounter};
 pub use instant::{Duration, Instant};
 pub use ticker::{Tick, Ticker, TimeStep};
 
@@ -34,7 +33,7 @@ pub use ticker::{Tick, Ticker, TimeStep};
 /// |---|---|---|
 /// | a device, such as [`Bus::next_edge`](crate::dji::Bus::next_edge) | [`Condition`](crate::motor::Condition) | [`MotorName`](crate::motor::MotorName) |
 /// | [`Runner::next_edge`](crate::runner::Runner::next_edge) | [`BusCondition`](crate::runner::BusCondition) | `()` |
-/// | a receiver, such as [`Dbus::edge`](crate::wire::dbus::Dbus::edge) | [`Silence`](crate::wire::Silence) | `()` |
+/// | a receiver, such as [`Dbus::edge`](crate::wire::dbus::Dbus::edge) | the text `"silence"`, its only condition | `()` |
 ///
 /// An edge is latched until read, and read once. While an edge waits, the same change is not latched again: an error of a motor that comes
 /// and goes at 1 kHz is one edge. The last edge read of a bus or of a receiver tells the present state.

@@ -35,9 +35,9 @@
 //! Source: taproot (GPL, facts only), librm; a public dump. Older headers, made after the first manual, put Q, E, Shift and
 //! Ctrl into bits 4 to 7 of the keys.
 
+use super::Counts;
 use super::deframer::count;
 use super::receiver::Deadline;
-use super::{Counts, Silence};
 use crate::time::{Duration, Edge, Instant};
 
 /// The length of a frame in bytes.
@@ -161,7 +161,7 @@ impl Dbus {
 
     /// Returns the oldest unread beginning or end of silence.
     #[must_use]
-    pub fn edge(&mut self, now: Instant) -> Option<Edge<Silence>> {
+    pub fn edge(&mut self, now: Instant) -> Option<Edge<&'static str>> {
         self.deadline.edge(now)
     }
 

@@ -61,7 +61,7 @@ mod receiver;
 use core::fmt;
 
 pub use deframer::{Counts, Decode, Deframer, Reject};
-pub use receiver::{Receiver, Silence};
+pub use receiver::Receiver;
 
 /// Why a frame cannot be written. Nothing useful stands in the buffer.
 ///

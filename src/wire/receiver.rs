@@ -78,9 +78,10 @@ impl<F: Decode + Copy, const N: usize> Receiver<F, N> {
         self.latest.filter(|_| self.deadline.is_live(now))
     }
 
-    /// Returns the oldest unread beginning or end of silence.
+    /// Returns the oldest unread beginning or end of silence, the only condition of a receiver: no new data until the deadline, or data not
+    /// to be trusted. A source is silent before its first data. The text is "silence began at 101000 us".
     #[must_use]
-    pub fn edge(&mut self, now: Instant) -> Option<Edge<Silence>> {
+    pub fn edge(&mut self, now: Instant) -> Option<Edge<&'static str>> {
         self.deadline.edge(now)
     }
 
@@ -103,30 +104,6 @@ impl<F: Decode + Copy, const N: usize> Receiver<F, N> {
     }
 }
 
-/// The condition of a source of data: no data until the deadline, or data not to be trusted.
-///
-/// A source is silent before its first data.
-///
-/// # Examples
-/// ```
-/// use drivetrain::time::{Edge, Instant};
-/// use drivetrain::wire::Silence;
-///
-/// let at = Instant::from_micros(101_000);
-/// let edge = Edge { source: (), condition: Silence, began: true, at };
-/// assert_eq!(edge.to_string(), "silence began at 101000 us");
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Silence;
-
-impl core::fmt::Display for Silence {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str("silence")
-    }
-}
-
 /// Watches an event that repeats within a time limit, and latches each change.
 ///
 /// At first, the source is silent. An edge is kept until read. When the source came and went more than once between two
@@ -138,7 +115,7 @@ pub(super) struct Deadline {
     met: Instant,
     live: bool,
     losses: u32,
-    pending: [Option<Edge<Silence>>; 2],
+    pending: [Option<Edge<&'static str>>; 2],
 }
 
 impl Deadline {
@@ -171,7 +148,7 @@ impl Deadline {
     }
 
     /// Returns the oldest unread edge.
-    pub(super) fn edge(&mut self, now: Instant) -> Option<Edge<Silence>> {
+    pub(super) fn edge(&mut self, now: Instant) -> Option<Edge<&'static str>> {
         self.expire(now);
         let [first, second] = self.pending;
         self.pending = [second, None];
@@ -195,7 +172,7 @@ impl Deadline {
         self.latch(edge(true, at));
     }
 
-    fn latch(&mut self, edge: Edge<Silence>) {
+    fn latch(&mut self, edge: Edge<&'static str>) {
         self.pending = match self.pending {
             [None, _] => [Some(edge), None],
             [first, None] => [first, Some(edge)],
@@ -205,8 +182,8 @@ impl Deadline {
 }
 
 /// Beginning or end of silence.
-const fn edge(began: bool, at: Instant) -> Edge<Silence> {
-    Edge { source: (), condition: Silence, began, at }
+const fn edge(began: bool, at: Instant) -> Edge<&'static str> {
+    Edge { source: (), condition: "silence", began, at }
 }
 
 #[cfg(test)]
@@ -264,7 +241,7 @@ mod tests {
         assert_eq!(deadline.losses(), 98 + 1);
     }
 
-    fn is_heard(edge: Edge<Silence>) -> bool {
+    fn is_heard(edge: Edge<&'static str>) -> bool {
         !edge.began
     }
 }

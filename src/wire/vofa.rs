@@ -12,13 +12,13 @@
 //!
 //! ```
 //! use drivetrain::wire::Deframer;
-//! use drivetrain::wire::vofa::{JustFloat, justfloat, text_line};
+//! use drivetrain::wire::vofa::{justfloat, text_line};
 //!
 //! let mut buffer = [0; 32];
 //! let mut bytes = justfloat(&[1.0, -2.5], &mut buffer)?;
 //! assert_eq!(bytes, [0, 0, 0x80, 0x3F, 0, 0, 0x20, 0xC0, 0, 0, 0x80, 0x7F]);
-//! let mut reader = Deframer::<JustFloat<2>, 12>::new();
-//! assert_eq!(reader.read(&mut bytes), Some(JustFloat([1.0, -2.5])));
+//! let mut reader = Deframer::<[f32; 2], 12>::new();
+//! assert_eq!(reader.read(&mut bytes), Some([1.0, -2.5]));
 //!
 //! assert_eq!(text_line("rpm", &[482.0, -0.25], &mut buffer)?, b"rpm:482.000,-0.250\n");
 //! # Ok::<(), drivetrain::wire::EncodeError>(())
@@ -116,15 +116,8 @@ impl Write for Line<'_> {
     }
 }
 
-/// A `JustFloat` frame of `C` channels, for a [`Deframer`](super::Deframer) of `4 * C + 4` bytes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct JustFloat<const C: usize>(
-    /// The channels.
-    pub [f32; C],
-);
-
-impl<const C: usize> Decode for JustFloat<C> {
+/// The channels of a `JustFloat` frame, for a [`Deframer`](super::Deframer) of `4 * C + 4` bytes.
+impl<const C: usize> Decode for [f32; C] {
     type Options = ();
     const PREFIX: usize = TAIL.len();
 
@@ -138,7 +131,7 @@ impl<const C: usize> Decode for JustFloat<C> {
 
     fn decode(_: &(), frame: &[u8]) -> Result<Self, Reject> {
         let values = frame.strip_suffix(&TAIL).ok_or(Reject::Unframed)?;
-        Reader(values).array(Reader::f32_le).map(Self).ok_or(Reject::Length)
+        Reader(values).array(Reader::f32_le).ok_or(Reject::Length)
     }
 }
 
@@ -158,8 +151,8 @@ mod tests {
         let mut buffer = [0; 16];
         let mut bytes = justfloat(&[f32::INFINITY, f32::NEG_INFINITY, 1.0], &mut buffer).unwrap();
         assert_eq!(tails(bytes), 1);
-        let mut reader = Deframer::<JustFloat<3>, 16>::new();
-        assert_eq!(reader.read(&mut bytes), Some(JustFloat([f32::MAX, f32::NEG_INFINITY, 1.0])));
+        let mut reader = Deframer::<[f32; 3], 16>::new();
+        assert_eq!(reader.read(&mut bytes), Some([f32::MAX, f32::NEG_INFINITY, 1.0]));
     }
 
     #[test]

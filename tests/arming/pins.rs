@@ -2,7 +2,7 @@
 
 use crate::{PAUSE_MS, at_ms};
 use drivetrain::motor::{ArmError, TargetError};
-use drivetrain::pwm::{Brushed, BrushedConfig, RcConfig, RcPwm};
+use drivetrain::pwm::{Brushed, BrushedConfig, RcPwm};
 use drivetrain::time::Tick;
 use embedded_hal::{digital, pwm};
 
@@ -107,7 +107,7 @@ impl Esc {
 /// It arms for 2 s; the stop comes before, in between, and is taken back before these are over.
 #[test]
 fn an_rc_esc_does_not_arm_through_a_stop() {
-    let esc = RcPwm::new(Pin::default(), RcConfig::new()).unwrap();
+    let esc = RcPwm::new(Pin::default());
     let mut esc = Esc { esc, ms: 1_000 };
     let (_, idle) = esc.run(PAUSE_MS);
     let before: fn(&mut Esc) = |esc| {

@@ -5,7 +5,7 @@ use drivetrain::motor::{
     ArmError, CanDevice, Claim, Condition, Ingest, Malformed, MotorName, Role, Visitor,
     WrongSetting,
 };
-use drivetrain::pwm::{Brushed, BrushedConfig, RcConfig, RcPwm};
+use drivetrain::pwm::{Brushed, BrushedConfig, RcPwm};
 use drivetrain::time::{Duration, Edge, Instant, Tick};
 use embedded_hal::{digital, pwm};
 use std::cell::Cell;
@@ -257,10 +257,10 @@ fn brushed(config: BrushedConfig) -> Wired<Brushed<Pin, [Pin; 1]>> {
     Wired { motor, pulse, rest: 0, listens: true, now, waits: false }
 }
 
-fn rc(config: RcConfig, rest: u16) -> Wired<RcPwm<Pin>> {
+fn rc(config: fn(RcPwm<Pin>) -> RcPwm<Pin>, rest: u16) -> Wired<RcPwm<Pin>> {
     let (pulse, now) = (Pin::default(), Instant::START);
-    let config = config.with_arming_time(Duration::ZERO).with_full_speed(velocity(2.0));
-    let motor = RcPwm::new(pulse.clone(), config).unwrap();
+    let motor = config(RcPwm::new(pulse.clone())).with_arming_time(Duration::ZERO);
+    let motor = motor.with_full_speed(velocity(2.0)).unwrap();
     Wired { motor, pulse, rest, listens: false, now, waits: false }
 }
 
@@ -271,6 +271,6 @@ fn motors_on_pins_keep_the_contract() {
         .with_speed_loop(PidConfig::new(0.02, 0.3, 0.0));
     assert_eq!(check_contract(|| brushed(wheel)), Ok(RULES));
     assert_eq!(check_contract(|| brushed(wheel.reversed().with_limit(0.3))), Ok(RULES));
-    assert_eq!(check_contract(|| rc(RcConfig::new(), 1_500)), Ok(RULES));
-    assert_eq!(check_contract(|| rc(RcConfig::new().with_off_at_rest(), 0)), Ok(RULES));
+    assert_eq!(check_contract(|| rc(|esc| esc, 1_500)), Ok(RULES));
+    assert_eq!(check_contract(|| rc(RcPwm::with_off_at_rest, 0)), Ok(RULES));
 }

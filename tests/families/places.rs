@@ -10,9 +10,10 @@ use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{
     Controller, DamiaoDrive, Drive, DriveShaft, Fault, Line, RobStrideDrive, Sender, Simulation,
 };
-use drivetrain::time::{Duration, Instant, ManualClock};
+use drivetrain::time::{Duration, Instant};
 use drivetrain::units::AngularVelocity;
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
+use std::cell::Cell;
 
 /// The driver of the simulator, which evicts the frame of the lowest priority; or refuses the fourth frame until it was polled.
 struct Driver<'w> {
@@ -168,13 +169,13 @@ impl embedded_can::nb::Can for Picky {
 /// Operation frames that leave must not hide questions that never do: both have the motor in one claim.
 #[test]
 fn a_question_that_never_leaves_beside_commands_that_do_is_a_bus_that_is_down() {
-    let clock = ManualClock::new(Instant::START);
+    let clock = Cell::new(Instant::START);
     let mode = ImpedanceControl::new(5.0).unwrap();
     let motor = robstride::Motor::new(robstride::Model::RS02, 1, mode).unwrap();
     let can = Picky { refused: [0x03, 0x11], received: None };
     let mut runner = Runner::new(Nb(can), &clock, Own::new(motor));
     for _ in 0..150 {
-        clock.advance(Duration::from_millis(1));
+        clock.set(clock.get() + Duration::from_millis(1));
         let feedback = [0x7F, 0xFF, 0x7F, 0xFF, 0x7F, 0xFF, 1, 0];
         let id = ExtendedId::new(0x0200_01FD).unwrap();
         runner.port_mut().0.received = Some(CanFrame::of(id, feedback));

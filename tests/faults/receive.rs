@@ -8,8 +8,9 @@ use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Ingest, Link, Malformed};
 use drivetrain::runner::{BusCondition, FrameQueue, Nb, Runner};
 use drivetrain::sim::{Fault, Line, Simulation};
-use drivetrain::time::{Duration, Instant, ManualClock, Tick};
+use drivetrain::time::{Duration, Instant, Tick};
 use embedded_can::{ErrorKind, ExtendedId, Frame, StandardId};
+use std::cell::Cell;
 
 /// The cases of this file.
 pub(crate) const CASES: &[Case] = cases![
@@ -214,7 +215,7 @@ fn f12_a_full_queue_and_an_overrun_are_counted_and_freshness_does_the_rest() {
     // By the runner: one edge, whatever the rate, and its end a second after the last.
     let mut queue = FrameQueue::<4>::new();
     let (mut interrupt, mut task) = queue.split();
-    let clock = ManualClock::new(at_ms(1));
+    let clock = Cell::new(at_ms(1));
     let world = Simulation::new(1);
     let (bus, _) = armed([Config::new(1)]);
     let mut runner = Runner::new(Nb(world.controller()), &clock, bus);

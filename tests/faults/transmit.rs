@@ -7,8 +7,9 @@ use drivetrain::frame::CanFrame;
 use drivetrain::motor::{ArmError, Link};
 use drivetrain::runner::{BusCondition, Nb, Runner};
 use drivetrain::sim::{Fault, Line, Simulation};
-use drivetrain::time::{Duration, ManualClock, Tick};
+use drivetrain::time::{Duration, Tick};
 use embedded_can::ErrorKind;
+use std::cell::Cell;
 use std::collections::VecDeque;
 
 /// The cases of this file.
@@ -50,19 +51,19 @@ fn run(
     ticks: u64,
     mut script: impl FnMut(&mut Scripted, u64),
 ) -> (Vec<CanFrame>, drivetrain::runner::Statistics) {
-    let clock = ManualClock::new(at_ms(1));
+    let clock = Cell::new(at_ms(1));
     let (bus, wheels) = armed([1, 5].map(Config::new));
     let mut runner = Runner::new(Nb(Scripted::default()), &clock, bus);
     for round in 1..=ticks {
-        clock.advance(Duration::from_millis(1));
+        clock.set(clock.get() + Duration::from_millis(1));
         for id in [0x201, 0x205] {
-            _ = runner.ingest(&feedback(id, 0, 0), clock.now());
+            _ = runner.ingest(&feedback(id, 0, 0), clock.get());
         }
         for wheel in wheels {
             _ = runner.device_mut().set_raw(wheel, i16::try_from(round % 10_000).unwrap());
         }
         script(&mut runner.port_mut().0, round);
-        runner.tick(Tick::new(clock.now(), 0.001));
+        runner.tick(Tick::new(clock.get(), 0.001));
     }
     (core::mem::take(&mut runner.port_mut().0.taken), runner.statistics())
 }
@@ -275,16 +276,16 @@ fn f70_a_driver_that_gives_each_frame_back_is_a_bus_that_is_down() {
     for (ids, places) in
         [(&[1_u8][..], 0), (&[1], 1), (&[1], 3), (&[1, 5], 0), (&[1, 5], 1), (&[1, 5], 3)]
     {
-        let clock = ManualClock::new(at_ms(1));
+        let clock = Cell::new(at_ms(1));
         let mut bus = drivetrain::dji::Bus::new();
         let wheels: Vec<_> =
             ids.iter().map(|id| bus.attach(at_once::<M3508>(*id)).unwrap()).collect();
         let port = Mailboxes { waiting: VecDeque::new(), places, sends: true, sent: Vec::new() };
         let mut runner = Runner::new(Nb(port), &clock, bus);
         let turn = |runner: &mut Runner<Nb<Mailboxes>, _, drivetrain::dji::Bus>| {
-            clock.advance(Duration::from_millis(1));
+            clock.set(clock.get() + Duration::from_millis(1));
             for id in [0x201, 0x205] {
-                _ = runner.ingest(&feedback(id, 0, 0), clock.now());
+                _ = runner.ingest(&feedback(id, 0, 0), clock.get());
             }
             for wheel in &wheels {
                 _ = runner.device_mut().set_raw(*wheel, 700);
@@ -306,16 +307,16 @@ fn f70_a_driver_that_gives_each_frame_back_is_a_bus_that_is_down() {
         assert_eq!(sent > 400, is_well, "{what}: {sent}");
         // Then it takes nothing any more.
         runner.port_mut().0.sends = false;
-        let begin = clock.now();
+        let begin = clock.get();
         while !runner.is_bus_down() {
             turn(&mut runner);
-            assert!(clock.now() < begin + Duration::from_millis(200), "{what}: never down");
+            assert!(clock.get() < begin + Duration::from_millis(200), "{what}: never down");
         }
-        down_after.push(clock.now().since(begin).as_micros() / 1_000);
+        down_after.push(clock.get().since(begin).as_micros() / 1_000);
         assert!(!runner.is_armed(), "{what}");
-        assert_eq!(runner.arm(Tick::new(clock.now(), 0.001)), Err(ArmError::BusDown), "{what}");
+        assert_eq!(runner.arm(Tick::new(clock.get(), 0.001)), Err(ArmError::BusDown), "{what}");
         let down = runner.edges().find(|edge| edge.condition == BusCondition::Down).unwrap();
-        assert!(down.began && down.at == clock.now(), "{what}");
+        assert!(down.began && down.at == clock.get(), "{what}");
         for _ in 0..1_000 {
             turn(&mut runner);
             assert!(runner.is_bus_down(), "{what}: as long as nothing leaves");
@@ -332,7 +333,7 @@ fn f70_a_driver_that_gives_each_frame_back_is_a_bus_that_is_down() {
                 turn(&mut runner);
             }
             assert!(!runner.is_bus_down() && !runner.is_armed(), "{what}");
-            assert_eq!(runner.arm(Tick::new(clock.now(), 0.001)), Ok(()), "{what}");
+            assert_eq!(runner.arm(Tick::new(clock.get(), 0.001)), Ok(()), "{what}");
         }
     }
     let (first, last) = (down_after.iter().min().unwrap(), down_after.iter().max().unwrap());

@@ -370,7 +370,7 @@ fn a_mecanum_chassis_moves_as_it_is_asked_and_is_left_at_zero() {
         bench.step();
         robot.step();
     }
-    let moved = robot.world.chassis().unwrap().twist;
+    let moved = robot.world.chassis().unwrap().1;
     bench.end();
     robot.mark(&Witness::new(), END, 0);
     robot.receive();

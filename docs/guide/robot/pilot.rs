@@ -1,13 +1,13 @@
 use crate::base::Lower;
 use crate::robot::Wish;
-use drivetrain::chassis::{PowerBuffer, PowerModel, WheelLoad};
+use drivetrain::chassis::{PowerBuffer, PowerModel};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Handle, M3508};
 use drivetrain::error::ConfigError;
 use drivetrain::geometry::Twist;
 use drivetrain::shooter::ShooterOrder;
 use drivetrain::time::{Instant, Tick};
-use drivetrain::units::Angle;
+use drivetrain::units::{Angle, AngularVelocity};
 use drivetrain::wire::dbus::{Dbus, Switch};
 use drivetrain::wire::referee::Referee;
 
@@ -63,9 +63,9 @@ impl Pilot {
         let limit_w = self.referee.power_limit_w(tick.now());
         let charge_j = self.referee.buffer_energy_j(tick.now());
         let allowed_w = self.buffer.allowance_w(limit_w, charge_j, tick.dt_s());
-        let loads = wheels.map(|wheel| WheelLoad {
-            torque: bus.commanded_current(wheel).map_or(0.0, |current| current.as_amperes()),
-            speed_rad_s: bus.state(wheel).map_or(0.0, |state| state.velocity.as_rad_per_s()),
+        let loads = wheels.map(|wheel| {
+            let current = bus.commanded_current(wheel).map_or(0.0, |current| current.as_amperes());
+            (current, bus.state(wheel).map_or(AngularVelocity::ZERO, |state| state.velocity))
         });
         bus.scale_outputs(wheels, self.model.cut(loads, allowed_w).0);
     }

@@ -4,7 +4,7 @@ use super::JOINTS;
 use super::imu::Imu;
 use super::servo::Servo;
 use drivetrain::encoder::Position;
-use drivetrain::sim::{JointConfig, MotorConfig, MotorKey, MotorState, SimError, Simulation};
+use drivetrain::sim::{Line, MotorConfig, MotorKey, MotorState, SimError, Simulation};
 use drivetrain::time::Duration;
 
 /// The loop of the firmware's main function, and the step of servo and sensors.
@@ -26,7 +26,7 @@ impl<'w> Plant<'w> {
     pub(crate) fn new(world: &'w Simulation, seed: u64) -> Result<Self, SimError> {
         let mut joints = Vec::new();
         for id in 1..=12 {
-            joints.push(world.attach_joint(JointConfig::new(id))?);
+            joints.push(world.attach_joint(Line::Can1, id, None)?);
         }
         let joints = joints.try_into().map_err(|_| SimError::Full)?;
         for gripper in [MotorConfig::gm6020_voltage(1), MotorConfig::m2006(1)] {

@@ -23,7 +23,6 @@ pub fn call_all() {
     Swerve::<4>::with_hysteresis.call();
     Swerve::<4>::with_hold_below.call();
     Swerve::<4>::without_cosine_compensation.call();
-    SwerveSteering::<4>::new.call();
     ModuleState::new.call();
     <AngularVelocity as WheelSpeed>::is_finite.call();
     <ModuleState as WheelSpeed>::is_finite.call();
@@ -111,7 +110,7 @@ pub fn call_all() {
     Odometry::set_gyro_offset.call();
     PowerModel::new.call();
     PowerModel::power_w.call();
-    (|model: &PowerModel, wheels: [WheelLoad; 4], limit_w: f32| {
+    (|model: &PowerModel, wheels: [(f32, AngularVelocity); 4], limit_w: f32| {
         PowerModel::cut(model, wheels, limit_w)
     })
     .call();
@@ -124,8 +123,10 @@ pub fn call_all() {
     PowerFit::new.call();
     PowerFit::model.call();
     PowerFit::rejected.call();
-    (|fit: &mut PowerFit, wheels: [WheelLoad; 4], watts: f32| PowerFit::learn(fit, wheels, watts))
-        .call();
+    (|fit: &mut PowerFit, wheels: [(f32, AngularVelocity); 4], watts: f32| {
+        PowerFit::learn(fit, wheels, watts)
+    })
+    .call();
     wheels!(MecanumWheels);
 }
 

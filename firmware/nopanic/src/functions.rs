@@ -5,7 +5,7 @@ use core::hint::black_box;
 use drivetrain::control::{Differentiator, Pid, PidConfig, WheelTuning, fhan};
 use drivetrain::dji::{
     AnyHandle, AttachError, Bus, Config, Facts, Feedback, Gm6020Current, Gm6020Voltage, Handle,
-    M2006, M3508, Message, WordGains,
+    M2006, M3508, WordGains,
 };
 use drivetrain::encoder::{GearRatio, Homing, Position, Shaft, resolve_gap, shortest};
 use drivetrain::error::ConfigError;
@@ -20,7 +20,7 @@ use drivetrain::runner::{
     BlockingTx, EmergencyStop, FrameQueue, FrameReceiver, FrameSender, Nb, Runner, Statistics,
 };
 use drivetrain::time::TimeStep;
-use drivetrain::time::{Clock, Duration, ExtendedCounter, Instant, ManualClock, Tick, Ticker};
+use drivetrain::time::{Clock, Duration, ExtendedCounter, Instant, Tick, Ticker};
 use drivetrain::units::{Angle, AngularVelocity, Current, Voltage};
 use embedded_can::{ErrorKind, Frame, Id};
 
@@ -111,10 +111,6 @@ fn time() {
     ExtendedCounter::new_16_bit.call();
     ExtendedCounter::new_32_bit.call();
     ExtendedCounter::extend.call();
-    ManualClock::new.call();
-    ManualClock::now.call();
-    ManualClock::advance.call();
-    ManualClock::set.call();
     Tick::new.call();
     Tick::now.call();
     Tick::dt_s.call();
@@ -403,7 +399,6 @@ fn dji() {
     Facts::of_word.call();
     Facts::place.call();
     AttachError::message.call();
-    Message::as_str.call();
     Config::<M3508>::new.call();
     Config::<M3508>::reversed.call();
     Config::<M3508>::speed_loop.call();

@@ -1,13 +1,14 @@
 //! Both drivers of the MCP2515 on a chip of 128 registers, by its data sheet (DS20001801, chapter 12).
 
 use super::{Interface, Mcp25xx, Mcp2515};
+use core::cell::Cell;
 use core::pin::pin;
 use core::task::{Context, Poll, Waker};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, M3508};
 use drivetrain::frame::CanFrame;
 use drivetrain::runner::{AbortPending, Nb, NbAbort, Runner};
-use drivetrain::time::{Duration, Instant, ManualClock, Tick};
+use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::Current;
 use embedded_can::Frame;
 use embedded_can::nb::Can;
@@ -166,14 +167,14 @@ impl DelayNs for Wire {
 
 /// Drives a motor, pulls the plug for 50 ms while its current changes, and returns what leaves when it is back.
 fn after_a_pulled_plug<C: AbortPending>(wire: &Wire, driver: C) -> Vec<CanFrame> {
-    let clock = ManualClock::new(Instant::START);
+    let clock = Cell::new(Instant::START);
     let mut bus = Bus::new();
     let motor =
         bus.attach(Config::<M3508>::new(1).speed_loop(PidConfig::new(1.0, 0.0, 0.0))).unwrap();
     let mut runner = Runner::new(NbAbort(Nb(driver)), &clock, bus);
     let mut drive = |from: u16, until: u16| {
         for ms in from..until {
-            clock.advance(Duration::from_millis(1));
+            clock.set(clock.get() + Duration::from_millis(1));
             if wire.0.borrow().is_plugged {
                 wire.receive(0x201, [0, 0, 0, 0, 0, 0, 30, 0]);
             }

@@ -6,7 +6,7 @@ use crate::wiring::{Drive, START, Targets};
 use core::hint::black_box;
 use drivetrain::chassis::{
     Chassis, ChassisLimits, ChassisMode, Mecanum, MecanumWheels, ModeConfig, Modes, ModuleState,
-    Omni, PowerModel, Swerve, SwerveSteering, WheelLoad,
+    Omni, PowerModel, Swerve,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Handle, M3508};
@@ -69,7 +69,7 @@ fn robot_swerve_forward(swerve: &Swerve<4>, modules: &Modules) -> Twist<Body> {
 #[inline(never)]
 fn robot_steer(
     swerve: &Swerve<4>,
-    memory: &mut SwerveSteering<4>,
+    memory: &mut [Option<(Angle, bool)>; 4],
     wanted: &Modules,
     angles: &[Option<Angle>; 4],
 ) -> Modules {
@@ -84,7 +84,7 @@ fn robot_modes(modes: &mut Modes, twist: &Twist<Gimbal>, yaw: Angle) -> Option<T
 
 #[unsafe(no_mangle)]
 #[inline(never)]
-fn robot_cut(model: &PowerModel, loads: &[WheelLoad; 4]) -> (f32, f32) {
+fn robot_cut(model: &PowerModel, loads: &[(f32, AngularVelocity); 4]) -> (f32, f32) {
     model.cut(*loads, 60.0)
 }
 
@@ -154,9 +154,10 @@ fn kinematics() {
         _ = black_box(f(&swerve, &modules));
     });
     row("swerve_forward", &[forward]);
-    let mut memory = SwerveSteering::new();
+    let mut memory = [None; 4];
     let angles = modules.map(|module| Some(module.angle));
-    let function = robot_steer as fn(&_, &mut SwerveSteering<4>, &Modules, &[_; 4]) -> Modules;
+    let function =
+        robot_steer as fn(&_, &mut [Option<(Angle, bool)>; 4], &Modules, &[_; 4]) -> Modules;
     let steer = instructions(function, |f, call| {
         let wanted = swerve.inverse(motion(call));
         _ = black_box(f(&swerve, &mut memory, &wanted, &angles));
@@ -166,8 +167,8 @@ fn kinematics() {
 
 fn power() {
     let model = PowerModel::new(1.0, 1.0, 2.0, 0.001).unwrap();
-    let loads = [1.0, 2.0, 3.0, -1.0].map(|torque| WheelLoad { torque, speed_rad_s: 10.0 });
-    let function = robot_cut as fn(&PowerModel, &[WheelLoad; 4]) -> (f32, f32);
+    let loads = [1.0, 2.0, 3.0, -1.0].map(|torque| (torque, AngularVelocity::from_rad_per_s(10.0)));
+    let function = robot_cut as fn(&PowerModel, &[(f32, AngularVelocity); 4]) -> (f32, f32);
     let cut = instructions(function, |f, _| {
         _ = black_box(f(&model, &loads));
     });

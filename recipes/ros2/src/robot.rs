@@ -140,14 +140,14 @@ pub fn run() -> Result<(), Box<dyn Error>> {
         runner.tick(tick);
         ticks = ticks.wrapping_add(1);
         if ticks.is_multiple_of(TICKS_PER_REPORT) {
-            let (pose, body) = (chassis.pose(), world.chassis().ok_or("no chassis")?);
+            let (pose, (body, twist)) = (chassis.pose(), world.chassis().ok_or("no chassis")?);
             let (at, heading) = (pose.position().to_vec(), pose.heading().angle().as_radians());
             let place = [at.x.into(), at.y.into(), heading.into()];
             // The next message replaces one that could not leave.
             _ = odom.publish(odometry(place, chassis.measured(), now));
             _ = joints.publish(joint_state(runner.device(), wheels, now));
-            let place = [body.x_m, body.y_m, body.heading_rad];
-            _ = truth.publish(odometry(place, body.twist, now));
+            let place = [body.x_m, body.y_m, body.angle.as_radians()].map(f64::from);
+            _ = truth.publish(odometry(place, twist, now));
         }
     }
 }

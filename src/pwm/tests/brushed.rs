@@ -163,13 +163,13 @@ fn a_pin_that_fails_is_named_and_tried_again() {
     motor.arm(at_ms(1)).unwrap();
     motor.set_duty(0.5).unwrap();
     log.broken.set("in1");
-    assert_eq!(motor.update(tick(1)), Err(BrushedError::Direction(Broken)));
+    assert_eq!(motor.update(tick(1)), Err(OneOf::Second(Broken)));
     assert_eq!(last(&log), 0, "no pulse while the direction is not sure");
     log.broken.set("");
     motor.update(tick(2)).unwrap();
     assert_eq!(last(&log), 10_000);
     log.broken.set("pwm");
-    assert_eq!(motor.update(tick(3)), Err(BrushedError::Pwm(Broken)));
+    assert_eq!(motor.update(tick(3)), Err(OneOf::First(Broken)));
 }
 
 /// The last level of a pin.
@@ -187,7 +187,7 @@ fn a_stop_opens_the_bridge_where_the_pulse_cannot_be_taken_away() {
     assert_eq!((level(&log, "in1"), level(&log, "in2")), (1, 0));
     log.broken.set("pwm");
     motor.disarm();
-    assert_eq!(motor.update(tick(2)), Err(BrushedError::Pwm(Broken)));
+    assert_eq!(motor.update(tick(2)), Err(OneOf::First(Broken)));
     assert_eq!((level(&log, "in1"), level(&log, "in2")), (0, 0));
 }
 
@@ -201,7 +201,7 @@ fn after_a_failed_pin_both_pins_are_set_again() {
         motor.update(tick(1)).unwrap();
         log.broken.set("in2");
         motor.set_duty(-0.5).unwrap();
-        assert_eq!(motor.update(tick(2)), Err(BrushedError::Direction(Broken)));
+        assert_eq!(motor.update(tick(2)), Err(OneOf::Second(Broken)));
         assert_eq!(level(&log, "pwm"), 0);
         log.broken.set("");
         motor.set_duty(next).unwrap();

@@ -3,7 +3,8 @@
 use super::*;
 use crate::control::PidConfig;
 use crate::motor::{
-    ArmError, Capability, Condition, HealthConfig, Link, Reaction, TargetError, VelocityDrive,
+    ArmError, Capability, Condition, HealthConfig, Link, OneOf, Reaction, TargetError,
+    VelocityDrive,
 };
 use crate::time::{Duration, Instant, Tick};
 use crate::units::AngularVelocity;
@@ -86,11 +87,9 @@ impl BrushedConfig {
     }
 }
 
-impl RcConfig {
-    /// An ESC whose output range opens at once.
-    const fn at_once() -> Self {
-        Self::new().with_opening(Duration::ZERO)
-    }
+/// An ESC whose output range opens at once.
+fn at_once(log: &Log) -> RcPwm<Pin<'_>> {
+    RcPwm::new(pin("esc", log)).with_opening(Duration::ZERO)
 }
 
 fn at_ms(ms: u64) -> Instant {

@@ -3,9 +3,10 @@
 use super::*;
 use crate::error::ConfigError;
 
-fn armed(log: &Log, config: RcConfig) -> RcPwm<Pin<'_>> {
-    let config = config.with_arming_time(Duration::from_millis(5));
-    let mut esc = RcPwm::new(pin("esc", log), config).unwrap();
+const PERIOD: Duration = Duration::from_millis(20);
+
+fn armed(esc: RcPwm<Pin<'_>>) -> RcPwm<Pin<'_>> {
+    let mut esc = esc.with_arming_time(Duration::from_millis(5));
     esc.arm().unwrap();
     for ms in 0..=5 {
         esc.update(tick(ms)).unwrap();
@@ -17,7 +18,7 @@ fn armed(log: &Log, config: RcConfig) -> RcPwm<Pin<'_>> {
 #[test]
 fn targets_are_taken_only_after_neutral_for_the_arming_time() {
     let log = Log::default();
-    let mut esc = RcPwm::new(pin("esc", &log), RcConfig::at_once()).unwrap();
+    let mut esc = at_once(&log);
     esc.update(tick(0)).unwrap();
     assert_eq!((last(&log), esc.set_throttle(1.0)), (1_500, Err(TargetError::Disarmed)));
     esc.arm().unwrap();
@@ -35,8 +36,7 @@ fn targets_are_taken_only_after_neutral_for_the_arming_time() {
 #[test]
 fn throttle_is_linear_on_both_sides_of_neutral_and_saturates() {
     let log = Log::default();
-    let config = RcConfig::at_once().with_pulses_us(1_100, 1_480, 1_940);
-    let mut esc = armed(&log, config);
+    let mut esc = armed(at_once(&log).with_pulses_us([1_100, 1_480, 1_940], PERIOD).unwrap());
     for (ms, (throttle, pulse)) in (6..).zip([
         (0.0, 1_480),
         (1.0, 1_940),
@@ -51,7 +51,7 @@ fn throttle_is_linear_on_both_sides_of_neutral_and_saturates() {
         assert_eq!(last(&log), pulse, "{throttle}");
     }
     let log = Log::default();
-    let mut fan = armed(&log, RcConfig::at_once().with_pulses_us(1_000, 1_000, 2_000));
+    let mut fan = armed(at_once(&log).with_pulses_us([1_000, 1_000, 2_000], PERIOD).unwrap());
     fan.set_throttle(-0.7).unwrap();
     fan.update(tick(6)).unwrap();
     assert_eq!(last(&log), 1_000, "it turns one way");
@@ -60,8 +60,7 @@ fn throttle_is_linear_on_both_sides_of_neutral_and_saturates() {
 #[test]
 fn the_arming_time_begins_with_the_first_neutral_pulse_that_the_channel_took() {
     let log = Log::default();
-    let config = RcConfig::at_once().with_arming_time(Duration::from_millis(100));
-    let mut esc = RcPwm::new(pin("esc", &log), config).unwrap();
+    let mut esc = at_once(&log).with_arming_time(Duration::from_millis(100));
     esc.arm().unwrap();
     log.broken.set("esc");
     for ms in 0..500 {
@@ -80,7 +79,7 @@ fn the_arming_time_begins_with_the_first_neutral_pulse_that_the_channel_took() {
 #[test]
 fn old_targets_nan_and_stops_give_neutral() {
     let log = Log::default();
-    let mut esc = armed(&log, RcConfig::at_once());
+    let mut esc = armed(at_once(&log));
     esc.set_throttle(0.4).unwrap();
     esc.update(tick(105)).unwrap();
     assert_eq!(last(&log), 1_700);
@@ -100,7 +99,7 @@ fn old_targets_nan_and_stops_give_neutral() {
 #[test]
 fn a_servo_without_a_pulse_when_idle_goes_limp_and_never_to_its_centre() {
     let log = Log::default();
-    let mut servo = armed(&log, RcConfig::at_once().with_off_at_rest());
+    let mut servo = armed(at_once(&log).with_off_at_rest());
     servo.set_throttle(0.4).unwrap();
     for (ms, pulse) in [(105, 1_700), (106, 0)] {
         servo.update(tick(ms)).unwrap();
@@ -120,7 +119,7 @@ fn a_servo_without_a_pulse_when_idle_goes_limp_and_never_to_its_centre() {
 fn a_clock_that_stands_or_goes_back_gives_neutral() {
     for next_ms in [50, 49, 6] {
         let log = Log::default();
-        let mut esc = armed(&log, RcConfig::at_once());
+        let mut esc = armed(at_once(&log));
         esc.set_throttle(1.0).unwrap();
         esc.update(tick(50)).unwrap();
         assert_eq!(last(&log), 2_000);
@@ -141,7 +140,7 @@ fn a_clock_that_stands_or_goes_back_gives_neutral() {
 #[test]
 fn an_update_without_a_step_gives_a_pulse_once() {
     let log = Log::default();
-    let mut esc = armed(&log, RcConfig::at_once());
+    let mut esc = armed(at_once(&log));
     let mut pulse = |ms: u64, dt_s: f32| {
         esc.set_throttle(1.0).unwrap();
         esc.update(Tick::new(at_ms(ms), dt_s)).unwrap();
@@ -155,7 +154,7 @@ fn an_update_without_a_step_gives_a_pulse_once() {
 #[test]
 fn the_throttle_opens_after_arming() {
     let log = Log::default();
-    let mut esc = armed(&log, RcConfig::new());
+    let mut esc = armed(RcPwm::new(pin("esc", &log)));
     for (ms, pulse) in [(6, 1_503), (55, 1_625), (105, 1_750), (204, 1_998), (205, 2_000)] {
         esc.set_throttle(1.0).unwrap();
         esc.update(tick(ms)).unwrap();
@@ -166,7 +165,7 @@ fn the_throttle_opens_after_arming() {
 #[test]
 fn a_lost_command_is_one_edge_with_its_time_however_often_it_happens() {
     let log = Log::default();
-    let mut esc = armed(&log, RcConfig::at_once().with_id(7));
+    let mut esc = armed(at_once(&log).with_id(7));
     for round in 0..1_000 {
         esc.set_throttle(0.1).unwrap();
         for ms in [6, 60, 120] {
@@ -186,11 +185,11 @@ fn a_lost_command_is_one_edge_with_its_time_however_often_it_happens() {
 #[test]
 fn velocities_need_a_full_speed_and_are_not_measured() {
     let log = Log::default();
-    let mut esc = armed(&log, RcConfig::at_once());
+    let mut esc = armed(at_once(&log));
     let rpm = AngularVelocity::from_rpm;
     assert_eq!(esc.set_velocity((), rpm(10.0)), Err(TargetError::Unsupported));
     assert_eq!(esc.capabilities(()).to_string(), "raw");
-    let mut esc = armed(&log, RcConfig::at_once().with_full_speed(rpm(1_000.0)));
+    let mut esc = armed(at_once(&log).with_full_speed(rpm(1_000.0)).unwrap());
     esc.set_velocity((), rpm(-250.0)).unwrap();
     esc.update(tick(6)).unwrap();
     assert_eq!((last(&log), esc.velocity(())), (1_375, None));
@@ -199,14 +198,15 @@ fn velocities_need_a_full_speed_and_are_not_measured() {
 
 #[test]
 fn invalid_parameters_are_named() {
-    let config = RcConfig::at_once();
-    for (config, name) in [
-        (config.with_pulses_us(2_000, 1_500, 1_000), "low pulse"),
-        (config.with_pulses_us(1_000, 2_100, 2_000), "neutral pulse"),
-        (config.with_period(Duration::from_micros(1_900)), "period"),
-        (config.with_full_speed(AngularVelocity::from_rpm(f32::NAN)), "full speed"),
+    let log = Log::default();
+    let pulses =
+        |pulses, period_us| at_once(&log).with_pulses_us(pulses, Duration::from_micros(period_us));
+    for (esc, name) in [
+        (pulses([2_000, 1_500, 1_000], 20_000), "low pulse"),
+        (pulses([1_000, 2_100, 2_000], 20_000), "neutral pulse"),
+        (pulses([1_000, 1_500, 2_000], 1_900), "period"),
+        (at_once(&log).with_full_speed(AngularVelocity::from_rpm(f32::NAN)), "full speed"),
     ] {
-        let log = Log::default();
-        assert_eq!(RcPwm::new(pin("esc", &log), config).err(), Some(ConfigError::Unusable(name)));
+        assert_eq!(esc.err(), Some(ConfigError::Unusable(name)));
     }
 }

@@ -5,7 +5,8 @@ mod places;
 use super::*;
 use crate::dji::{Bus, Config, Handle, M3508};
 use crate::motor::{ArmError, Ingest};
-use crate::time::{Instant, ManualClock};
+use crate::time::Instant;
+use core::cell::Cell;
 use embedded_can::{ErrorKind, Frame, StandardId};
 use std::collections::VecDeque;
 use std::vec::Vec;
@@ -45,17 +46,17 @@ fn frame(id: u16, data: [u8; 8]) -> CanFrame {
     CanFrame::standard(id, data).unwrap()
 }
 
-type TestRunner<'c> = Runner<Nb<Scripted>, &'c ManualClock, Bus>;
+type TestRunner<'c> = Runner<Nb<Scripted>, &'c Cell<Instant>, Bus>;
 
 /// Two M3508 in two command frames, armed, with a non-zero target for each.
-fn driving(clock: &ManualClock) -> (TestRunner<'_>, [Handle<M3508>; 2]) {
+fn driving(clock: &Cell<Instant>) -> (TestRunner<'_>, [Handle<M3508>; 2]) {
     let mut bus = Bus::new();
     let wheels = bus.attach_all([1, 5].map(Config::<M3508>::at_once)).unwrap();
     let mut can = Scripted::default();
     can.receive.extend([0x201, 0x205].map(|id| Ok(frame(id, [0; 8]))));
     let mut runner = Runner::new(Nb(can), clock, bus);
     runner.poll(8);
-    let tick = Tick::new(clock.now(), 0.001);
+    let tick = Tick::new(clock.get(), 0.001);
     runner.arm(tick).unwrap();
     set(&mut runner, wheels, 1);
     runner.tick(tick);
@@ -69,9 +70,9 @@ fn set(runner: &mut TestRunner<'_>, wheels: [Handle<M3508>; 2], raw: i16) {
     }
 }
 
-fn hear(runner: &mut TestRunner<'_>, clock: &ManualClock) {
+fn hear(runner: &mut TestRunner<'_>, clock: &Cell<Instant>) {
     for id in [0x201, 0x205] {
-        assert_eq!(runner.ingest(&frame(id, [0; 8]), clock.now()), Ingest::Taken);
+        assert_eq!(runner.ingest(&frame(id, [0; 8]), clock.get()), Ingest::Taken);
     }
 }
 
@@ -81,20 +82,20 @@ fn offered(runner: &mut TestRunner<'_>) -> Vec<(u32, u8)> {
 
 #[test]
 fn a_driver_that_would_block_for_ever_does_not_hold_the_loop() {
-    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let clock = Cell::new(Instant::from_micros(1_000));
     let (mut runner, wheels) = driving(&clock);
     runner.port_mut().0.always = Some(nb::Error::WouldBlock);
     for raw in 2..50 {
-        clock.advance(Duration::from_millis(1));
+        clock.set(clock.get() + Duration::from_millis(1));
         hear(&mut runner, &clock);
         set(&mut runner, wheels, raw);
-        runner.tick(Tick::new(clock.now(), 0.001));
+        runner.tick(Tick::new(clock.get(), 0.001));
     }
     assert_eq!(offered(&mut runner).len(), 48, "one try a tick");
     runner.port_mut().0.always = None;
-    clock.advance(Duration::from_millis(1));
+    clock.set(clock.get() + Duration::from_millis(1));
     set(&mut runner, wheels, 77);
-    runner.tick(Tick::new(clock.now(), 0.001));
+    runner.tick(Tick::new(clock.get(), 0.001));
     let mut sent = offered(&mut runner);
     assert_eq!(runner.statistics().superseded, 96, "two frames in each of 48 ticks");
     sent.sort_unstable();
@@ -103,15 +104,15 @@ fn a_driver_that_would_block_for_ever_does_not_hold_the_loop() {
 
 #[test]
 fn a_refused_frame_goes_first_next_time() {
-    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let clock = Cell::new(Instant::from_micros(1_000));
     let (mut runner, wheels) = driving(&clock);
     for raw in 2..1000 {
-        clock.advance(Duration::from_millis(1));
+        clock.set(clock.get() + Duration::from_millis(1));
         hear(&mut runner, &clock);
         set(&mut runner, wheels, raw % 100 + 1);
         // One place a tick: with a fixed order the second frame would never get a place.
         runner.port_mut().0.transmit.extend([Ok(None), Err(nb::Error::WouldBlock)]);
-        runner.tick(Tick::new(clock.now(), 0.001));
+        runner.tick(Tick::new(clock.get(), 0.001));
     }
     let sent: Vec<u32> = offered(&mut runner).chunks(2).map(|pair| pair[0].0).collect();
     let first = sent.iter().filter(|id| **id == 0x200).count();
@@ -120,26 +121,26 @@ fn a_refused_frame_goes_first_next_time() {
 
 #[test]
 fn an_evicted_frame_is_sent_later_and_a_foreign_one_handed_back() {
-    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let clock = Cell::new(Instant::from_micros(1_000));
     let (mut runner, wheels) = driving(&clock);
     let foreign = frame(0x7FF, [9; 8]);
-    clock.advance(Duration::from_millis(1));
+    clock.set(clock.get() + Duration::from_millis(1));
     set(&mut runner, wheels, 2);
     runner.port_mut().0.transmit.extend([Ok(Some(foreign)), Ok(Some(frame(0x200, [0; 8])))]);
     let mut handed_back = Vec::new();
-    runner.tick_with(Tick::new(clock.now(), 0.001), |frame| handed_back.push(*frame));
+    runner.tick_with(Tick::new(clock.get(), 0.001), |frame| handed_back.push(*frame));
     assert_eq!(handed_back, [foreign]);
     let statistics = runner.statistics();
     assert_eq!((statistics.evicted, statistics.evicted_unrelated), (1, 1));
     _ = offered(&mut runner);
-    clock.advance(Duration::from_millis(1));
-    runner.tick(Tick::new(clock.now(), 0.001));
+    clock.set(clock.get() + Duration::from_millis(1));
+    runner.tick(Tick::new(clock.get(), 0.001));
     assert_eq!(offered(&mut runner)[0].0, 0x200);
 }
 
 #[test]
 fn driver_errors_are_counted_by_kind_and_the_loop_goes_on() {
-    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let clock = Cell::new(Instant::from_micros(1_000));
     let (mut runner, wheels) = driving(&clock);
     let error = |kind| nb::Error::Other(kind);
     let can = &mut runner.port_mut().0;
@@ -151,7 +152,7 @@ fn driver_errors_are_counted_by_kind_and_the_loop_goes_on() {
     can.transmit.extend([Err(error(ErrorKind::Acknowledge)), Ok(None)]);
     assert_eq!(runner.poll(16), 1);
     set(&mut runner, wheels, 2);
-    runner.tick(Tick::new(clock.now(), 0.001));
+    runner.tick(Tick::new(clock.get(), 0.001));
     let statistics = runner.statistics();
     let heard = [ErrorKind::Overrun, ErrorKind::Crc].map(|kind| statistics.receive_errors_of(kind));
     assert_eq!((heard, statistics.receive_errors()), ([1, 1], 2));
@@ -162,7 +163,7 @@ fn driver_errors_are_counted_by_kind_and_the_loop_goes_on() {
 
 #[test]
 fn a_driver_that_only_errs_ends_every_poll() {
-    let clock = ManualClock::new(Instant::START);
+    let clock = Cell::new(Instant::START);
     let mut can = Scripted::default();
     can.receive.extend((0..1000).map(|_| Err(nb::Error::Other(ErrorKind::Other))));
     let mut runner = Runner::new(Nb(can), &clock, Bus::new());
@@ -172,7 +173,7 @@ fn a_driver_that_only_errs_ends_every_poll() {
 
 #[test]
 fn a_flood_of_foreign_frames_is_bounded_and_handed_back_in_order() {
-    let clock = ManualClock::new(Instant::START);
+    let clock = Cell::new(Instant::START);
     let mut can = Scripted::default();
     let flood: Vec<CanFrame> = (0..100)
         .map(|id| CanFrame::new(StandardId::new(0x300 + id).unwrap(), &[1]).unwrap())
@@ -187,50 +188,50 @@ fn a_flood_of_foreign_frames_is_bounded_and_handed_back_in_order() {
 
 #[test]
 fn a_bus_that_takes_nothing_for_100_ms_disarms_and_offers_zeros_afterwards() {
-    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let clock = Cell::new(Instant::from_micros(1_000));
     let (mut runner, wheels) = driving(&clock);
     runner.port_mut().0.always = Some(nb::Error::Other(ErrorKind::Other));
     for ms in 0..150 {
-        clock.advance(Duration::from_millis(1));
+        clock.set(clock.get() + Duration::from_millis(1));
         hear(&mut runner, &clock);
         _ = runner.device_mut().set_raw(wheels[0], 900);
-        runner.tick(Tick::new(clock.now(), 0.001));
+        runner.tick(Tick::new(clock.get(), 0.001));
         assert_eq!(runner.is_armed(), ms < 100, "{ms}");
     }
     assert_eq!((runner.is_bus_down(), runner.statistics().bus_losses), (true, 1));
-    let tick = Tick::new(clock.now(), 0.001);
+    let tick = Tick::new(clock.get(), 0.001);
     assert_eq!(runner.arm(tick), Err(ArmError::BusDown));
     runner.port_mut().0.always = None;
     _ = offered(&mut runner);
-    clock.advance(Duration::from_millis(1));
-    runner.tick(Tick::new(clock.now(), 0.001));
+    clock.set(clock.get() + Duration::from_millis(1));
+    runner.tick(Tick::new(clock.get(), 0.001));
     assert_eq!(offered(&mut runner), [(0x200, 0), (0x1FF, 0)]);
     assert!(!runner.is_bus_down() && !runner.is_armed());
     assert_eq!(runner.arm(tick), Err(ArmError::NotReleased), "asked for while the bus was down");
     pause(&mut runner, &clock);
-    assert_eq!(runner.arm(Tick::new(clock.now(), 0.001)), Ok(()));
+    assert_eq!(runner.arm(Tick::new(clock.get(), 0.001)), Ok(()));
 }
 
 /// 100 ms without a request to arm.
-fn pause(runner: &mut TestRunner<'_>, clock: &ManualClock) {
+fn pause(runner: &mut TestRunner<'_>, clock: &Cell<Instant>) {
     for _ in 0..100 {
-        clock.advance(Duration::from_millis(1));
+        clock.set(clock.get() + Duration::from_millis(1));
         hear(runner, clock);
-        runner.tick(Tick::new(clock.now(), 0.001));
+        runner.tick(Tick::new(clock.get(), 0.001));
     }
 }
 
 #[test]
 fn one_frame_that_never_leaves_is_a_lost_bus_though_its_neighbour_does() {
-    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let clock = Cell::new(Instant::from_micros(1_000));
     let (mut runner, wheels) = driving(&clock);
     let step = |runner: &mut TestRunner<'_>, raw| {
-        clock.advance(Duration::from_millis(1));
+        clock.set(clock.get() + Duration::from_millis(1));
         hear(runner, &clock);
         for wheel in wheels {
             _ = runner.device_mut().set_raw(wheel, raw);
         }
-        runner.tick(Tick::new(clock.now(), 0.001));
+        runner.tick(Tick::new(clock.get(), 0.001));
     };
     runner.port_mut().0.stuck = Some(0x1FF);
     for ms in 1..=150 {
@@ -241,7 +242,7 @@ fn one_frame_that_never_leaves_is_a_lost_bus_though_its_neighbour_does() {
     assert_eq!(runner.next_edge().map(|edge| edge.condition), Some(BusCondition::Down));
     let newest = offered(&mut runner).into_iter().rfind(|(id, _)| *id == 0x200);
     assert_eq!(newest, Some((0x200, 0)), "the healthy one stops its motors");
-    assert_eq!(runner.arm(Tick::new(clock.now(), 0.001)), Err(ArmError::BusDown));
+    assert_eq!(runner.arm(Tick::new(clock.get(), 0.001)), Err(ArmError::BusDown));
     runner.port_mut().0.stuck = None;
     step(&mut runner, 900);
     assert!(!runner.is_bus_down() && runner.next_edge().is_some_and(|edge| !edge.began));
@@ -249,13 +250,13 @@ fn one_frame_that_never_leaves_is_a_lost_bus_though_its_neighbour_does() {
 
 #[test]
 fn a_frame_no_longer_offered_does_not_count_as_unsent() {
-    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let clock = Cell::new(Instant::from_micros(1_000));
     let (mut runner, _) = driving(&clock);
     runner.port_mut().0.stuck = Some(0x1FF);
     let run = |runner: &mut TestRunner<'_>, ticks| {
         for _ in 0..ticks {
-            clock.advance(Duration::from_millis(1));
-            runner.tick(Tick::new(clock.now(), 0.001));
+            clock.set(clock.get() + Duration::from_millis(1));
+            runner.tick(Tick::new(clock.get(), 0.001));
         }
         runner.is_bus_down()
     };
@@ -268,7 +269,7 @@ fn a_frame_no_longer_offered_does_not_count_as_unsent() {
 
 /// Runs three frames over a driver that fails one call in each tick; returns how often each frame left.
 fn sent_beside_a_failure(place: usize) -> [usize; 3] {
-    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let clock = Cell::new(Instant::from_micros(1_000));
     let mut bus = Bus::new();
     bus.attach_all([1, 5].map(Config::<M3508>::at_once)).unwrap();
     bus.attach(Config::<crate::dji::Gm6020Voltage>::new(5)).unwrap();
@@ -276,11 +277,11 @@ fn sent_beside_a_failure(place: usize) -> [usize; 3] {
     let mut runner = Runner::new(Nb(Scripted::default()), &clock, bus);
     let mut sent = [0; 3];
     for _ in 0..400 {
-        clock.advance(Duration::from_millis(1));
+        clock.set(clock.get() + Duration::from_millis(1));
         let mut answers = [Ok(None); 3];
         answers[place] = Err(nb::Error::Other(ErrorKind::Bit));
         runner.port_mut().0.transmit = answers.into();
-        runner.tick(Tick::new(clock.now(), 0.001));
+        runner.tick(Tick::new(clock.get(), 0.001));
         let tried = offered(&mut runner);
         assert_eq!(tried.len(), 3);
         let taken = tried.into_iter().enumerate().filter(|(index, _)| *index != place);
@@ -305,39 +306,39 @@ fn a_driver_that_fails_one_call_a_tick_keeps_no_frame_from_the_bus() {
 #[test]
 fn the_emergency_stop_acts_on_the_next_tick_and_stays() {
     static STOP: EmergencyStop = EmergencyStop::new();
-    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let clock = Cell::new(Instant::from_micros(1_000));
     let (runner, wheels) = driving(&clock);
     let mut runner = runner.with_emergency_stop(&STOP);
     set(&mut runner, wheels, 50);
     STOP.set();
-    clock.advance(Duration::from_millis(1));
-    runner.tick(Tick::new(clock.now(), 0.001));
+    clock.set(clock.get() + Duration::from_millis(1));
+    runner.tick(Tick::new(clock.get(), 0.001));
     assert!(offered(&mut runner).iter().all(|(_, raw)| *raw == 0));
-    assert_eq!(runner.arm(Tick::new(clock.now(), 0.001)), Err(ArmError::Stopped));
+    assert_eq!(runner.arm(Tick::new(clock.get(), 0.001)), Err(ArmError::Stopped));
     runner.clear_emergency_stop();
     assert!(!runner.is_armed());
-    clock.advance(Duration::from_millis(99));
+    clock.set(clock.get() + Duration::from_millis(99));
     hear(&mut runner, &clock);
-    assert_eq!(runner.arm(Tick::new(clock.now(), 0.001)), Err(ArmError::NotReleased));
+    assert_eq!(runner.arm(Tick::new(clock.get(), 0.001)), Err(ArmError::NotReleased));
     pause(&mut runner, &clock);
-    assert_eq!(runner.arm(Tick::new(clock.now(), 0.001)), Ok(()));
+    assert_eq!(runner.arm(Tick::new(clock.get(), 0.001)), Ok(()));
 }
 
 #[test]
 fn frames_add_up() {
-    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let clock = Cell::new(Instant::from_micros(1_000));
     let (mut runner, wheels) = driving(&clock);
     let answers = [Ok(None), Err(nb::Error::WouldBlock), Err(nb::Error::Other(ErrorKind::Bit))];
     for round in 0..3_000_usize {
-        clock.advance(Duration::from_millis(1));
+        clock.set(clock.get() + Duration::from_millis(1));
         let id = 0x1FE + u16::try_from(round % 16).unwrap();
         let length = round % 9;
         let received = CanFrame::new(StandardId::new(id).unwrap(), &[0; 8][..length]).unwrap();
-        _ = runner.ingest(&received, clock.now());
+        _ = runner.ingest(&received, clock.get());
         hear(&mut runner, &clock);
         set(&mut runner, wheels, 3);
         runner.port_mut().0.transmit.push_back(answers[round % 3]);
-        runner.tick(Tick::new(clock.now(), 0.001));
+        runner.tick(Tick::new(clock.get(), 0.001));
     }
     let (s, bus) = (runner.statistics(), runner.device().counters());
     assert_eq!(s.received, s.taken + s.unrelated + s.malformed);
@@ -370,13 +371,13 @@ impl embedded_can::blocking::Can for Blocking {
 
 #[test]
 fn a_blocking_driver_sends_and_is_never_asked_for_a_frame() {
-    let clock = ManualClock::new(Instant::START);
+    let clock = Cell::new(Instant::START);
     let mut bus = Bus::new();
     bus.attach(Config::<M3508>::at_once(1)).unwrap();
     let mut runner = Runner::new(BlockingTx(Blocking::default()), &clock, bus);
     assert_eq!(runner.poll(100), 0);
     for _ in 0..30 {
-        clock.advance(Duration::from_millis(1));
+        clock.set(clock.get() + Duration::from_millis(1));
         let tick = runner.due().unwrap();
         runner.tick(tick);
     }

@@ -4,23 +4,23 @@ use super::*;
 use std::vec;
 
 /// A tick in which only the first of both frames finds a place.
-fn tick_with_one_place(runner: &mut TestRunner<'_>, clock: &ManualClock) {
-    clock.advance(Duration::from_millis(1));
+fn tick_with_one_place(runner: &mut TestRunner<'_>, clock: &Cell<Instant>) {
+    clock.set(clock.get() + Duration::from_millis(1));
     hear(runner, clock);
     runner.port_mut().0.transmit.extend([Ok(None), Err(nb::Error::WouldBlock)]);
-    runner.tick(Tick::new(clock.now(), 0.001));
+    runner.tick(Tick::new(clock.get(), 0.001));
     assert_eq!(offered(runner).len(), 2);
 }
 
 #[test]
 fn a_frame_without_a_place_is_offered_by_each_poll_until_sent() {
-    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let clock = Cell::new(Instant::from_micros(1_000));
     let (mut runner, wheels) = driving(&clock);
     set(&mut runner, wheels, 2);
     tick_with_one_place(&mut runner, &clock);
     runner.port_mut().0.transmit.push_back(Err(nb::Error::WouldBlock));
     for expected in [&[(0x1FF, 2)][..], &[(0x1FF, 2)], &[]] {
-        clock.advance(Duration::from_micros(100));
+        clock.set(clock.get() + Duration::from_micros(100));
         assert_eq!(runner.poll(8), 0);
         assert_eq!(offered(&mut runner), expected);
     }
@@ -31,19 +31,19 @@ fn a_frame_without_a_place_is_offered_by_each_poll_until_sent() {
 #[test]
 fn a_poll_offers_nothing_after_a_stop_and_after_the_period() {
     static STOP: EmergencyStop = EmergencyStop::new();
-    let stops: [fn(&mut TestRunner<'_>, &ManualClock); 4] = [
+    let stops: [fn(&mut TestRunner<'_>, &Cell<Instant>); 4] = [
         |runner, _| runner.device_mut().emergency_stop(),
         |runner, _| runner.device_mut().disarm(),
         |_, _| STOP.set(),
-        |_, clock| clock.advance(Duration::from_micros(900)),
+        |_, clock| clock.set(clock.get() + Duration::from_micros(900)),
     ];
     for stop in stops {
-        let clock = ManualClock::new(Instant::from_micros(1_000));
+        let clock = Cell::new(Instant::from_micros(1_000));
         let (runner, wheels) = driving(&clock);
         let mut runner = runner.with_emergency_stop(&STOP);
         set(&mut runner, wheels, 2);
         tick_with_one_place(&mut runner, &clock);
-        clock.advance(Duration::from_micros(100));
+        clock.set(clock.get() + Duration::from_micros(100));
         stop(&mut runner, &clock);
         runner.poll(8);
         assert_eq!(offered(&mut runner), []);
@@ -55,20 +55,20 @@ fn a_poll_offers_nothing_after_a_stop_and_after_the_period() {
 #[test]
 fn a_poll_offers_the_rest_of_a_tick_that_saw_the_stop() {
     static STOP: EmergencyStop = EmergencyStop::new();
-    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let clock = Cell::new(Instant::from_micros(1_000));
     let (runner, wheels) = driving(&clock);
     let mut runner = runner.with_emergency_stop(&STOP);
     set(&mut runner, wheels, 2);
     STOP.set();
     tick_with_one_place(&mut runner, &clock);
-    clock.advance(Duration::from_micros(100));
+    clock.set(clock.get() + Duration::from_micros(100));
     runner.poll(8);
     assert_eq!(offered(&mut runner), [(0x1FF, 0)]);
 }
 
 #[test]
 fn a_frame_of_others_evicted_by_a_poll_is_handed_back_by_the_next_tick() {
-    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let clock = Cell::new(Instant::from_micros(1_000));
     let (mut runner, wheels) = driving(&clock);
     let foreign = frame(0x7FF, [9; 8]);
     set(&mut runner, wheels, 2);
@@ -79,21 +79,21 @@ fn a_frame_of_others_evicted_by_a_poll_is_handed_back_by_the_next_tick() {
     runner.poll(8);
     assert_eq!(offered(&mut runner), [], "one at a time is kept");
     let mut handed_back = Vec::new();
-    clock.advance(Duration::from_millis(1));
-    runner.tick_with(Tick::new(clock.now(), 0.001), |frame| handed_back.push(*frame));
+    clock.set(clock.get() + Duration::from_millis(1));
+    runner.tick_with(Tick::new(clock.get(), 0.001), |frame| handed_back.push(*frame));
     assert_eq!((handed_back, runner.statistics().evicted_unrelated), (vec![foreign], 1));
 }
 
 #[test]
 fn a_frame_of_others_evicted_after_one_without_a_place_is_not_lost() {
-    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let clock = Cell::new(Instant::from_micros(1_000));
     let (mut runner, wheels) = driving(&clock);
     let foreign = frame(0x7FF, [9; 8]);
-    clock.advance(Duration::from_millis(1));
+    clock.set(clock.get() + Duration::from_millis(1));
     hear(&mut runner, &clock);
     set(&mut runner, wheels, 2);
     runner.port_mut().0.transmit.push_back(Err(nb::Error::WouldBlock));
-    runner.tick(Tick::new(clock.now(), 0.001));
+    runner.tick(Tick::new(clock.get(), 0.001));
     let full = Err(nb::Error::WouldBlock);
     runner.port_mut().0.transmit.extend([full, Ok(Some(foreign))]);
     for offers in [2, 0] {
@@ -102,7 +102,7 @@ fn a_frame_of_others_evicted_after_one_without_a_place_is_not_lost() {
         assert_eq!(offered(&mut runner).len(), offers);
     }
     let mut handed_back = Vec::new();
-    clock.advance(Duration::from_millis(1));
-    runner.tick_with(Tick::new(clock.now(), 0.001), |frame| handed_back.push(*frame));
+    clock.set(clock.get() + Duration::from_millis(1));
+    runner.tick_with(Tick::new(clock.get(), 0.001), |frame| handed_back.push(*frame));
     assert_eq!(handed_back, [foreign]);
 }

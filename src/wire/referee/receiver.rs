@@ -1,7 +1,7 @@
 use super::{BarrelHeat, MAX_FRAME, RefereeMessage};
 use crate::time::{Duration, Edge, Instant};
 use crate::wire::receiver::Deadline;
-use crate::wire::{Counts, Deframer, Silence};
+use crate::wire::{Counts, Deframer};
 
 /// A buffer energy above this is no reading: a public super-capacitor controller (HKUST, 2024) counts no more either.
 const MOST_BUFFER_J: u16 = 300;
@@ -181,7 +181,7 @@ impl Referee {
 
     /// Returns the oldest unread edge of the power limit's silence.
     #[must_use]
-    pub fn edge(&mut self, now: Instant) -> Option<Edge<Silence>> {
+    pub fn edge(&mut self, now: Instant) -> Option<Edge<&'static str>> {
         self.limit_w.deadline.edge(now)
     }
 

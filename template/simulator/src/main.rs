@@ -21,7 +21,7 @@ fn pilot(ms: u64) -> Remote {
 }
 
 /// Drives for 3 s. Returns the largest speed and the way, in m/s and m.
-fn drive() -> Result<(f32, f64), Box<dyn Error>> {
+fn drive() -> Result<(f32, f32), Box<dyn Error>> {
     let world = Simulation::new(1);
     let wheel = |id, y| -> Result<Wheel, Box<dyn Error>> {
         let wheel =
@@ -50,9 +50,9 @@ fn drive() -> Result<(f32, f64), Box<dyn Error>> {
         while let Some(edge) = runner.device_mut().next_edge() {
             println!("{edge}");
         }
-        fastest = fastest.max(world.chassis().ok_or("no chassis")?.twist.vx_m_s);
+        fastest = fastest.max(world.chassis().ok_or("no chassis")?.1.vx_m_s);
     }
-    Ok((fastest, world.chassis().ok_or("no chassis")?.x_m))
+    Ok((fastest, world.chassis().ok_or("no chassis")?.0.x_m))
 }
 
 fn main() -> Result<(), Box<dyn Error>> {

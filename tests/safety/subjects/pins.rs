@@ -1,7 +1,7 @@
 //! Motors on the pins of a microcontroller.
 
 use super::*;
-use drivetrain::pwm::{Brushed, BrushedConfig, RcConfig, RcPwm};
+use drivetrain::pwm::{Brushed, BrushedConfig, RcPwm};
 use drivetrain::time::Duration;
 use embedded_hal::{digital, pwm};
 use std::convert::Infallible;
@@ -63,8 +63,7 @@ macro_rules! calls {
 
 /// The ESC takes no time to arm.
 pub(crate) fn esc(setup: Setup) -> RcPwm<Pin> {
-    let config = RcConfig::new().with_arming_time(Duration::ZERO).with_opening(setup.opening);
-    RcPwm::new(Pin(0), config).unwrap()
+    RcPwm::new(Pin(0)).with_arming_time(Duration::ZERO).with_opening(setup.opening)
 }
 
 impl Subject<1> for RcPwm<Pin> {

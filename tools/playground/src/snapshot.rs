@@ -3,6 +3,7 @@
 use crate::robot::Robot;
 use drivetrain::dji::Feedback;
 use drivetrain::frame::CanFrame;
+use drivetrain::geometry::Pose2;
 use drivetrain::sim::{Line, Sender, Simulation, Transmission};
 use embedded_can::{Frame, Id};
 use std::collections::VecDeque;
@@ -18,13 +19,12 @@ pub(crate) fn numbers(world: &Simulation, robot: &dyn Robot, is_switch_on: bool)
     let narrow = |value: f64| value as f32;
     let flag = |is: bool| f32::from(u8::from(is));
     let chassis = world.chassis();
-    let [x, y, heading] =
-        chassis.map_or([0.0; 3], |state| [state.x_m, state.y_m, state.heading_rad]);
+    let pose = chassis.map_or(Pose2::ORIGIN, |(pose, _)| pose);
     let mut numbers = vec![
         narrow(world.now().as_micros() as f64 * 1e-6),
-        narrow(x),
-        narrow(y),
-        narrow(heading),
+        pose.x_m,
+        pose.y_m,
+        pose.angle.as_radians(),
         flag(robot.is_armed()),
         flag(is_switch_on),
         world.traffic(Line::Can1).load(),

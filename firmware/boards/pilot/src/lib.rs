@@ -28,7 +28,7 @@ use drivetrain::wire::dbus::{Dbus, Remote};
 use drivetrain::wire::hipnuc::{Imu, MAX_FRAME};
 use drivetrain::wire::parameters::{Parameter, Parameters};
 use drivetrain::wire::vofa::justfloat;
-use drivetrain::wire::{Counts, Receiver, Silence};
+use drivetrain::wire::{Counts, Receiver};
 use gesture::{Gesture, at_rest};
 
 /// The robot that is driven: its mass, wheels and motors, from which the gains follow. The example `tune` measures better ones.
@@ -143,7 +143,7 @@ impl Pilot {
     }
 
     /// Hands over who was heard and lost since, for the log.
-    pub fn edges(&mut self, now: Instant, mut log: impl FnMut(&'static str, Edge<Silence>)) {
+    pub fn edges(&mut self, now: Instant, mut log: impl FnMut(&'static str, Edge<&'static str>)) {
         while let Some(edge) = self.dbus.edge(now) {
             log("remote control", edge);
         }

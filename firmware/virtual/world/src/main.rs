@@ -17,9 +17,7 @@ mod parse;
 
 use drivetrain::frame::CanFrame;
 use drivetrain::geometry::Vec2;
-use drivetrain::sim::{
-    ChassisConfig, JointConfig, Line, MotorConfig, MotorKey, Sender, Simulation, Wheel,
-};
+use drivetrain::sim::{ChassisConfig, Line, MotorConfig, MotorKey, Sender, Simulation, Wheel};
 use drivetrain::time::Instant;
 use parse::{Outcome, fault, frame, instant, line};
 use std::fmt::Write as _;
@@ -62,7 +60,8 @@ impl World {
                 done()
             }
             "joint" => {
-                self.motors.push(self.simulation.attach_joint(JointConfig::new(next()?.parse()?))?);
+                let joint = self.simulation.attach_joint(Line::Can1, next()?.parse()?, None)?;
+                self.motors.push(joint);
                 done()
             }
             "body" => {
@@ -102,8 +101,8 @@ impl World {
                 Ok(format!("{rpm:.3} {amperes:.3} {} {degrees:.4} {}", state.command, u8::from(on)))
             }
             "pose" => {
-                let body = self.simulation.chassis().ok_or("no body")?;
-                let (heading, twist) = (body.heading_rad.to_degrees(), body.twist);
+                let (pose, twist) = self.simulation.chassis().ok_or("no body")?;
+                let heading = pose.angle.as_degrees();
                 let turning = twist.wz_rad_s.to_degrees();
                 Ok(format!("{heading:.4} {:.4} {:.4} {turning:.4}", twist.vx_m_s, twist.vy_m_s))
             }
@@ -143,9 +142,9 @@ impl World {
 
     /// A body that speeds up pulls what stands on it the other way.
     fn turn_the_body(&mut self, dt_s: f32) {
-        let Some(body) = self.simulation.chassis() else { return };
-        let before = std::mem::replace(&mut self.turning_rad_s, body.twist.wz_rad_s);
-        let acceleration = (body.twist.wz_rad_s - before) / dt_s;
+        let Some((_, twist)) = self.simulation.chassis() else { return };
+        let before = std::mem::replace(&mut self.turning_rad_s, twist.wz_rad_s);
+        let acceleration = (twist.wz_rad_s - before) / dt_s;
         for (motor, inertia) in &self.aboard {
             self.simulation.set_load_nm(*motor, -inertia * acceleration);
         }
