@@ -14,7 +14,7 @@ use drivetrain::damiao::{Model, Motor};
 use drivetrain::error::ConfigError;
 use drivetrain::geometry::Vec3;
 use drivetrain::manipulator::{ArmJoint, SerialArm};
-use drivetrain::motor::{AngleDrive, Devices, Impedance, ImpedanceControl, Own};
+use drivetrain::motor::{Actuator, AngleDrive, Devices, Impedance, ImpedanceControl};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{DamiaoDrive, DriveShaft, Line, Simulation};
 use drivetrain::time::Duration;
@@ -68,11 +68,11 @@ const TURNED: u64 = 3_500;
 const STOPPED: u64 = 5_000;
 const END: u64 = 5_300;
 
-type Joint = Own<Motor>;
+type Joint = Actuator<Motor>;
 
 fn joint(part: Part) -> Result<Joint, Box<dyn Error>> {
     let mode = ImpedanceControl::new(part.limit_nm)?;
-    Ok(Own::new(Motor::new(part.model, part.id, mode)?))
+    Ok(Actuator::new(Motor::new(part.model, part.id, mode)?))
 }
 
 /// Axes and masses in the zero pose: level, stretched along x, shoulder and elbow lift with positive angles.

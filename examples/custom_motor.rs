@@ -8,7 +8,7 @@ mod console;
 use drivetrain::control::{Pid, PidConfig};
 use drivetrain::dji::{Bus, Config, M3508};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{Claim, Ingest, Malformed, MotorName, Order, Own, OwnMotor};
+use drivetrain::motor::{Actuator, Claim, DriveProtocol, Ingest, Malformed, MotorName, Order};
 use drivetrain::motor::{Role, Target, Vitals};
 use drivetrain::units::AngularVelocity;
 use embedded_can::{Frame, Id, StandardId};
@@ -39,7 +39,7 @@ impl MyMotor {
     }
 }
 
-impl OwnMotor for MyMotor {
+impl DriveProtocol for MyMotor {
     fn name(&self) -> MotorName {
         MotorName::new("MyMotor", self.id)
     }
@@ -145,7 +145,7 @@ mod simulation {
         let mut bus = Bus::new();
         let wheel =
             bus.attach(Config::<M3508>::new(1).speed_loop(PidConfig::new(1.9, 2.4, 0.0)))?;
-        let robot = (bus, Own::new(MyMotor::new(3)?)); // a tuple of devices is a device
+        let robot = (bus, Actuator::new(MyMotor::new(3)?)); // a tuple of devices is a device
         let mut runner = Runner::new(Nb(world.controller()), world.clock(), robot);
 
         let (rpm, mine_rpm) = (200.0, -150.0);
@@ -197,7 +197,7 @@ mod simulation {
     /// A Damiao motor in its speed mode, command 0x200 + id: a classic trap beside DJI motors.
     struct DamiaoSpeed(MyMotor);
 
-    impl OwnMotor for DamiaoSpeed {
+    impl DriveProtocol for DamiaoSpeed {
         fn name(&self) -> MotorName {
             MotorName::new("DM4310 (velocity)", self.0.id)
         }
@@ -230,7 +230,7 @@ mod simulation {
     pub(crate) fn clash() -> Result<(), Box<dyn Error>> {
         let mut bus = Bus::new();
         bus.attach(Config::<M3508>::new(1))?;
-        let mut robot = (bus, Own::new(DamiaoSpeed(MyMotor::new(1)?)));
+        let mut robot = (bus, Actuator::new(DamiaoSpeed(MyMotor::new(1)?)));
         match robot.arm(Instant::START) {
             Err(ArmError::Clash(one, other)) => {
                 console::line(format_args!("refused: {one} clashes with {other}"));

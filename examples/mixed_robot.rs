@@ -14,7 +14,8 @@ use drivetrain::dji::{Bus, Config, Handle, M3508};
 use drivetrain::encoder::GearRatio;
 use drivetrain::geometry::{Body, Twist, Vec2};
 use drivetrain::motor::{
-    Condition, Devices, Impedance, ImpedanceControl, MotorName, Own, OwnMotor, VelocityDrive,
+    Actuator, Condition, Devices, DriveProtocol, Impedance, ImpedanceControl, MotorName,
+    VelocityDrive,
 };
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{
@@ -63,7 +64,7 @@ const END: u64 = 5_500;
 type Wheels = MecanumWheels<Handle<M3508>>;
 
 /// What the second bus has.
-type Turret = (Own<damiao::Motor>, Own<vesc::Motor>);
+type Turret = (Actuator<damiao::Motor>, Actuator<vesc::Motor>);
 
 fn chassis_bus() -> Result<(Bus, Wheels), Box<dyn Error>> {
     let mut bus = Bus::new();
@@ -80,7 +81,7 @@ fn chassis_bus() -> Result<(Bus, Wheels), Box<dyn Error>> {
 fn turret() -> Result<Turret, Box<dyn Error>> {
     let pitch = damiao::Motor::new(damiao::Model::J4310, 1, ImpedanceControl::new(4.0)?)?;
     let shooter = vesc::Mode::current_with_speed_loop(SPIN)?;
-    Ok((Own::new(pitch), Own::new(vesc::Motor::new(SHOOTER, 23, shooter)?)))
+    Ok((Actuator::new(pitch), Actuator::new(vesc::Motor::new(SHOOTER, 23, shooter)?)))
 }
 
 /// Sets the targets of the second bus. A motor that is not armed, or that tripped, refuses its target.

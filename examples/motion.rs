@@ -12,7 +12,7 @@ mod picture;
 use drivetrain::control::{MotionFollower, MotionLimits, Motions, ProfileState};
 use drivetrain::damiao::{Model, Motor};
 use drivetrain::math;
-use drivetrain::motor::{Devices, Impedance, ImpedanceControl, Own};
+use drivetrain::motor::{Actuator, Devices, Impedance, ImpedanceControl};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{DamiaoDrive, DriveShaft, Line, Simulation};
 use drivetrain::time::Duration;
@@ -70,7 +70,7 @@ struct Sample {
 fn simulate() -> Result<Vec<Sample>, Box<dyn Error>> {
     let world = Simulation::new(1);
     let mut drive = DamiaoDrive::of(MODEL, 1).with_shaft(DriveShaft::new(INERTIA, FRICTION_NM));
-    let joint = Own::new(Motor::new(MODEL, 1, ImpedanceControl::new(LIMIT_NM)?)?);
+    let joint = Actuator::new(Motor::new(MODEL, 1, ImpedanceControl::new(LIMIT_NM)?)?);
     let mut runner = Runner::new(Nb(world.controller()), world.clock(), joint);
     let mut follower = MotionFollower::new([ProfileState::default()]);
     let mut samples = Vec::new();

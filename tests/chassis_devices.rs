@@ -9,8 +9,9 @@ use drivetrain::dji::{Bus, Config, Handle, M3508};
 use drivetrain::frame::CanFrame;
 use drivetrain::geometry::{Heading, Twist, Vec2};
 use drivetrain::motor::{
-    AngleDrive, Capabilities, Capability, Claim, Condition, Devices, HealthConfig, Ingest,
-    MotorName, OneOf, Order, Own, OwnMotor, Reaction, Role, Target, TargetError, VelocityDrive,
+    Actuator, AngleDrive, Capabilities, Capability, Claim, Condition, Devices, DriveProtocol,
+    HealthConfig, Ingest, MotorName, OneOf, Order, Reaction, Role, Target, TargetError,
+    VelocityDrive,
 };
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{Controller, Fault, Line, MotorConfig, Simulation};
@@ -290,8 +291,8 @@ struct Hub {
 }
 
 impl Hub {
-    fn new(id: u8) -> Own<Self> {
-        Own::new(Self { id, rad_per_s: 0.0 })
+    fn new(id: u8) -> Actuator<Self> {
+        Actuator::new(Self { id, rad_per_s: 0.0 })
     }
 
     fn command(&self, rad_per_s: f32) -> CanFrame {
@@ -307,7 +308,7 @@ fn standard(raw: u16) -> Id {
     StandardId::new(raw).unwrap().into()
 }
 
-impl OwnMotor for Hub {
+impl DriveProtocol for Hub {
     fn name(&self) -> MotorName {
         MotorName::new("hub", self.id)
     }

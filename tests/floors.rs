@@ -308,7 +308,7 @@ fn each_family_has_the_files_of_the_guide_and_is_named_around_its_folder() {
         sections.find(|section| section.starts_with(title)).unwrap().to_owned()
     };
     let (inside, around) = (section("The folder"), section("Around the folder"));
-    let beside = section("Beside an own motor");
+    let beside = section("Beside an actuator");
     assert!(paths(&inside).count() == 6 && paths(&around).count() == 10);
     assert_eq!(paths(&beside).count(), 4);
     for (family, _) in SIZES {
@@ -417,12 +417,12 @@ const RULES: [&str; 14] = [
 
 /// Durations that a family compares with a limit: of the frames of its drives, none of a link or a target. File, words, reason.
 const TIMES_OF_DRIVES: [(&str, &str, &str); 6] = [
-    ("pwm/rc.rs", "config . arming", "an ESC wants neutral for so long before it follows"),
+    ("pwm/rc.rs", "arming_time", "an ESC wants neutral for so long before it follows"),
     ("snake/slot.rs", "KEEP_RELAXED", "a disable is sent again: a drive may have missed it"),
     ("snake/slot/health.rs", "window", "a joint that does not move, as its configuration says"),
-    ("motor/own/power.rs", "SETTLING", "a drive may report its former state for so long"),
-    ("motor/own/power.rs", "pause", "a frame for the power of a drive is sent again"),
-    ("motor/own/update.rs", "INQUIRY", "the rate of questions for settings"),
+    ("motor/actuator/power.rs", "SETTLING", "a drive may report its former state for so long"),
+    ("motor/actuator/power.rs", "pause", "a frame for the power of a drive is sent again"),
+    ("motor/actuator/update.rs", "INQUIRY", "the rate of questions for settings"),
 ];
 
 fn own_rules(text: &str) -> Vec<String> {
@@ -456,10 +456,10 @@ fn own_judgements(text: &str) -> Vec<String> {
     statements.filter(judges).map(|statement| statement.join(" ")).collect()
 }
 
-/// The files of the families, and of own motors: the path below `src`, and the text.
+/// The files of the families, and of actuators: the path below `src`, and the text.
 fn files_of_families() -> impl Iterator<Item = (String, String)> {
     let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let folders = FAMILIES.into_iter().chain(["pwm", "motor/own"]);
+    let folders = FAMILIES.into_iter().chain(["pwm", "motor/actuator"]);
     let files = folders.flat_map(move |folder| {
         let files = rust_files(&src.join(folder)).into_iter();
         let src = src.clone();

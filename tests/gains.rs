@@ -8,7 +8,7 @@ use drivetrain::control::{PidConfig, WheelTuning};
 use drivetrain::damiao;
 use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, M2006, M3508, Model};
 use drivetrain::geometry::{Twist, Vec2};
-use drivetrain::motor::{AngleDrive, ImpedanceControl, Own};
+use drivetrain::motor::{Actuator, AngleDrive, ImpedanceControl};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{
     ChassisConfig, DamiaoDrive, DriveShaft, Line, MotorConfig, Simulation, Wheel,
@@ -338,7 +338,7 @@ fn the_gains_of_the_guide_turn_a_gimbal_and_a_loader_and_scale_with_the_inertia(
 /// A step of 90° of a joint whose inertia is so many times the stated one: the farthest beyond the goal in degrees, and after how many ms the
 /// joint stays within 1 degree.
 fn swing(control: ImpedanceControl, inertia: f32) -> (f32, u32) {
-    let joint = Own::new(damiao::Motor::new(damiao::Model::J4340, 1, control).unwrap());
+    let joint = Actuator::new(damiao::Motor::new(damiao::Model::J4340, 1, control).unwrap());
     let world = Simulation::new(1);
     let mut drive =
         DamiaoDrive::of(damiao::Model::J4340, 1).with_shaft(DriveShaft::new(inertia, 0.01));

@@ -10,7 +10,7 @@ mod own;
 use drivetrain::dji::{AnyHandle, Bus, Config, Gm6020Voltage, M3508};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::Devices;
-use drivetrain::motor::{Ingest, Own, VelocityDrive};
+use drivetrain::motor::{Actuator, Ingest, VelocityDrive};
 use drivetrain::runner::{BusCondition, Nb, Runner};
 use drivetrain::snake::{self, Command, Joint, Joints, Register};
 use drivetrain::time::{Duration, Instant, Tick};
@@ -131,7 +131,7 @@ macro_rules! on_each_device {
         $test("&mut", &[0x200, 0x1FF], || {
             Bench::new(&clock, &mut *Box::leak(Box::new(bus())), &two, |bus| drive_bus(bus))
         });
-        $test("an own motor", &[0x101], || Bench::new(&clock, own(1), &[healthy(1)], drive_own));
+        $test("an actuator", &[0x101], || Bench::new(&clock, own(1), &[healthy(1)], drive_own));
         let three = [1, 2, 3].map(healthy);
         $test("an array", &[0x101, 0x102, 0x103], || {
             Bench::new(&clock, [1, 2, 3].map(own), &three, |motors| {
@@ -163,7 +163,7 @@ fn drive_bus(bus: &mut Bus) {
     }
 }
 
-fn drive_own(motor: &mut Own<Mine>) {
+fn drive_own(motor: &mut Actuator<Mine>) {
     _ = motor.set_velocity((), AngularVelocity::from_rad_per_s(1.0));
 }
 
@@ -420,7 +420,7 @@ fn what_no_one_takes_is_counted_in_each_part_of_a_device() {
         let device = &mut device;
         device.superseded()
     }
-    let updates = |device: &mut Own<Mine>, count: u64| {
+    let updates = |device: &mut Actuator<Mine>, count: u64| {
         for ms in 0..=count {
             device.update(Tick::new(Instant::from_micros(1_000 * (1 + ms)), 0.001));
         }
@@ -684,7 +684,7 @@ fn a_frame_goes_back_to_the_part_that_sends_it_now() {
     }
 }
 
-/// A frame of an own motor that was refused, failed or evicted is replaced by a newer one, and was not counted: 0 of 10.
+/// A frame of an actuator that was refused, failed or evicted is replaced by a newer one, and was not counted: 0 of 10.
 #[test]
 fn a_frame_of_an_own_motor_that_comes_back_counts_as_superseded() {
     let at_ms = |ms: u64| Instant::from_micros(1_000 * ms);

@@ -5,7 +5,7 @@ use drivetrain::dji::{self, AnyHandle, Bus, Config, Gm6020Current, Gm6020Voltage
 use drivetrain::encoder::{GearRatio, Position};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    CanDevice, Claim, ImpedanceControl, Ingest, Malformed, MotorName, Own, OwnMotor, Role,
+    Actuator, CanDevice, Claim, DriveProtocol, ImpedanceControl, Ingest, Malformed, MotorName, Role,
 };
 use drivetrain::time::Instant;
 use drivetrain::units::AngularVelocity;
@@ -80,7 +80,7 @@ impl Listener for Dji {
     }
 }
 
-impl<M: OwnMotor> Listener for Own<M> {
+impl<M: DriveProtocol> Listener for Actuator<M> {
     fn name(&self) -> MotorName {
         self.motor().name()
     }
@@ -109,7 +109,7 @@ impl<M: OwnMotor> Listener for Own<M> {
 }
 
 /// A motor on a VESC, which reports its turns and its current beside the rest.
-struct Vesc(Own<vesc::Motor>);
+struct Vesc(Actuator<vesc::Motor>);
 
 impl Listener for Vesc {
     fn name(&self) -> MotorName {
@@ -250,13 +250,13 @@ pub(crate) fn listener(spec: Spec) -> Result<Box<dyn Listener>, String> {
                 max_velocity: any_speed,
             };
             let motor = vesc::Motor::new(model, id, vesc::Mode::velocity()).map_err(text)?;
-            Ok(Box::new(Vesc(Own::new(motor))))
+            Ok(Box::new(Vesc(Actuator::new(motor))))
         }
     }
 }
 
-fn own<M: OwnMotor + 'static>(motor: M) -> Result<Box<dyn Listener>, String> {
-    Ok(Box::new(Own::new(motor)))
+fn own<M: DriveProtocol + 'static>(motor: M) -> Result<Box<dyn Listener>, String> {
+    Ok(Box::new(Actuator::new(motor)))
 }
 
 fn dji<M: dji::Model>(id: u8) -> Result<Box<dyn Listener>, String> {

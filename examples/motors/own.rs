@@ -1,17 +1,17 @@
 //! A motor of each family whose drives have frames of their own: for the bench and the example `socketcan`.
 
-use drivetrain::motor::Own;
+use drivetrain::motor::Actuator;
 use drivetrain::{damiao, lk, odrive, rmd, robstride, vesc};
 
 /// The motor as a device.
 #[derive(Debug)]
 pub(crate) enum Kind {
-    Damiao(Own<damiao::Motor>),
-    Lk(Own<lk::Motor>),
-    Rmd(Own<rmd::Motor>),
-    RobStride(Own<robstride::Motor>),
-    Odrive(Own<odrive::Motor>),
-    Vesc(Own<vesc::Motor>),
+    Damiao(Actuator<damiao::Motor>),
+    Lk(Actuator<lk::Motor>),
+    Rmd(Actuator<rmd::Motor>),
+    RobStride(Actuator<robstride::Motor>),
+    Odrive(Actuator<odrive::Motor>),
+    Vesc(Actuator<vesc::Motor>),
 }
 
 /// Does the same with a motor of whatever family, or with whatever the `Kind` of the caller has for each family.

@@ -6,7 +6,9 @@ use drivetrain::control::PidConfig;
 use drivetrain::dji::{self, AnyHandle, Bus};
 use drivetrain::encoder::GearRatio;
 use drivetrain::error::ConfigError;
-use drivetrain::motor::{Devices, ImpedanceControl, Own, OwnMotor as _, VelocityDrive, Visitor};
+use drivetrain::motor::{
+    Actuator, Devices, DriveProtocol as _, ImpedanceControl, VelocityDrive, Visitor,
+};
 use drivetrain::runner::{Port, Runner};
 use drivetrain::time::{Clock, Duration, Instant, Tick};
 use drivetrain::units::AngularVelocity;
@@ -71,28 +73,28 @@ impl Robot {
             Model::Damiao(model) => {
                 let motor = damiao::Motor::new(model, id, torque(model.tmax_nm())?)?;
                 let master = host.unwrap_or(0x10 + u16::from(id));
-                (Kind::Damiao(Own::new(motor.with_master_id(master)?)), SPEED)
+                (Kind::Damiao(Actuator::new(motor.with_master_id(master)?)), SPEED)
             }
             Model::RobStride(model) => {
                 let motor = robstride::Motor::new(model, id, torque(model.tmax_nm())?)?;
                 let host = u8::try_from(host.unwrap_or(0xFD)).map_err(|_| "a host id is a byte")?;
-                (Kind::RobStride(Own::new(motor.with_host_id(host)?)), SPEED)
+                (Kind::RobStride(Actuator::new(motor.with_host_id(host)?)), SPEED)
             }
             // The loop of the drive, here and below. For RMD, VESC and LK V2.35 the drive alone limits the torque.
             Model::Lk(model) => {
                 let nm = GENTLE * model.max_torque_nm();
                 let mode = lk::Mode::velocity_with_torque_limit(SPEED, nm);
-                (Kind::Lk(Own::new(lk::Motor::new(model, id, mode)?)), SPEED)
+                (Kind::Lk(Actuator::new(lk::Motor::new(model, id, mode)?)), SPEED)
             }
             Model::Rmd(model) => {
                 let mode = rmd::Mode::velocity(SPEED);
-                (Kind::Rmd(Own::new(rmd::Motor::new(model, id, mode)?)), SPEED)
+                (Kind::Rmd(Actuator::new(rmd::Motor::new(model, id, mode)?)), SPEED)
             }
             Model::Odrive(firmware) => {
                 let model = odrive::Model::new("ODrive", 8.27 / MOTOR_NM_PER_A)?;
                 let mode = odrive::Mode::velocity(MOTOR_A * MOTOR_NM_PER_A);
                 let motor = odrive::Motor::new(model, firmware, id, FASTEST, mode)?;
-                (Kind::Odrive(Own::new(motor)), SPEED)
+                (Kind::Odrive(Actuator::new(motor)), SPEED)
             }
             Model::Vesc(pole_pairs) => {
                 let model = vesc::Model {
@@ -105,7 +107,7 @@ impl Robot {
                 };
                 let motor = vesc::Motor::new(model, id, vesc::Mode::velocity())?;
                 let speed = AngularVelocity::from_rpm(VESC_ERPM / f32::from(pole_pairs));
-                (Kind::Vesc(Own::new(motor)), speed)
+                (Kind::Vesc(Actuator::new(motor)), speed)
             }
         };
         self.own.push((kind, speed));

@@ -1,4 +1,4 @@
-//! Any frame, any time, any call, any trouble of the drive: an own motor of each family keeps its drive at rest unless it is armed
+//! Any frame, any time, any call, any trouble of the drive: an actuator of each family keeps its drive at rest unless it is armed
 //! and has a target. The judge is the simulated drive, which hears each frame.
 #![no_main]
 
@@ -6,8 +6,8 @@ use drivetrain::control::PidConfig;
 use drivetrain::encoder::GearRatio;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    AngleDrive, CanDevice, Devices, Impedance, ImpedanceControl, Ingest, Own, OwnMotor, Role,
-    VelocityDrive,
+    Actuator, AngleDrive, CanDevice, Devices, DriveProtocol, Impedance, ImpedanceControl, Ingest,
+    Role, VelocityDrive,
 };
 use drivetrain::sim::{DamiaoDrive, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive};
 use drivetrain::time::{Duration, Instant, Tick};
@@ -229,7 +229,7 @@ fn robstride_of(kind: u8, input: &mut Input) {
 
 /// A motor, its drive, and records apart from both.
 struct Bench<M, D> {
-    own: Own<M>,
+    own: Actuator<M>,
     drive: D,
     limits: Limits,
     /// What the drive sent.
@@ -245,7 +245,7 @@ struct Bench<M, D> {
     owed: u32,
 }
 
-fn run<M: OwnMotor + Copy + Debug, D: Drive>(
+fn run<M: DriveProtocol + Copy + Debug, D: Drive>(
     motor: M,
     drive: D,
     limits: Limits,
@@ -255,7 +255,7 @@ fn run<M: OwnMotor + Copy + Debug, D: Drive>(
         let mut clock = Clock::new(1_000);
         let now = Instant::from_micros(clock.read());
         let mut bench = Bench {
-            own: Own::new(motor),
+            own: Actuator::new(motor),
             drive,
             limits,
             answers: Vec::new(),
@@ -270,7 +270,7 @@ fn run<M: OwnMotor + Copy + Debug, D: Drive>(
     }
 }
 
-impl<M: OwnMotor + Copy + Debug, D: Drive> Bench<M, D> {
+impl<M: DriveProtocol + Copy + Debug, D: Drive> Bench<M, D> {
     fn play(&mut self, input: &mut Input, ask: impl Fn(&mut M, u8, f32)) {
         let mut left_ms = 1_000;
         while !input.is_empty() {

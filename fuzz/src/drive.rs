@@ -1,4 +1,4 @@
-//! The simulated drives that judge own motors.
+//! The simulated drives that judge actuators.
 
 use drivetrain::sim::{
     self, DamiaoDrive, DriveShaft, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive,

@@ -15,7 +15,7 @@ use drivetrain::damiao::{Model, Motor};
 use drivetrain::dji::{self, Bus, Handle, M3508};
 use drivetrain::frame::CanFrame;
 use drivetrain::geometry::AttitudeSource;
-use drivetrain::motor::{Devices, ImpedanceControl, Own};
+use drivetrain::motor::{Actuator, Devices, ImpedanceControl};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity, Current};
 use drivetrain::wire::Receiver;
@@ -53,7 +53,7 @@ defects! {
     Reversed = "reversed",
 }
 
-type Leg = [Own<Motor>; 2];
+type Leg = [Actuator<Motor>; 2];
 
 struct Robot {
     wheels: Bus,
@@ -74,7 +74,7 @@ struct Robot {
 fn leg() -> Outcome<Leg> {
     let joint = |id| -> Outcome<_> {
         let mode = ImpedanceControl::new(JOINT_NM)?;
-        Ok(Own::new(Motor::new(Model::J8009, id, mode)?))
+        Ok(Actuator::new(Motor::new(Model::J8009, id, mode)?))
     };
     Ok([joint(1)?, joint(2)?])
 }

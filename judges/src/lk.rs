@@ -9,7 +9,9 @@
 use crate::{Defect, Outcome};
 use drivetrain::frame::CanFrame;
 use drivetrain::lk::{Command, Feedback, Mode, Model, Motor, State};
-use drivetrain::motor::{AngleDrive, Devices, ImpedanceControl, Own, OwnMotor, VelocityDrive};
+use drivetrain::motor::{
+    Actuator, AngleDrive, Devices, DriveProtocol, ImpedanceControl, VelocityDrive,
+};
 use drivetrain::sim::{Drive, DriveShaft, LkDrive};
 use drivetrain::time::{Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
@@ -230,8 +232,8 @@ fn frames_of(id: u8, mode: &str) -> Outcome<Vec<CanFrame>> {
 }
 
 /// Arms a motor, drives it, loses the drive to an error and disarms; returns the frames that are no control command, each once.
-pub fn session<M: OwnMotor>(motor: M, mut drive: impl Served) -> Outcome<Vec<CanFrame>> {
-    let mut own = Own::new(motor);
+pub fn session<M: DriveProtocol>(motor: M, mut drive: impl Served) -> Outcome<Vec<CanFrame>> {
+    let mut own = Actuator::new(motor);
     let mut seen = Vec::new();
     for ms in 1..1_000_u64 {
         let now = Instant::from_micros(ms * 1_000);

@@ -16,7 +16,7 @@
 use crate::Outcome;
 use crate::defect::defects;
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{AngleDrive, Devices, ImpedanceControl, Own, VelocityDrive};
+use drivetrain::motor::{Actuator, AngleDrive, Devices, ImpedanceControl, VelocityDrive};
 use drivetrain::odrive::{Command, Feedback, Firmware, Heartbeat, Mode, Model, Motor};
 use drivetrain::sim::{Drive, OdriveDrive};
 use drivetrain::time::{Instant, Tick};
@@ -219,12 +219,12 @@ fn bench(
     digit: u8,
     end: &str,
     defect: Defect,
-    set: impl Fn(&mut Own<Motor>),
+    set: impl Fn(&mut Actuator<Motor>),
 ) -> Outcome<String> {
     let fastest = AngularVelocity::from_rad_per_s(20.0);
     let model = Model::D6374;
     let generation = firmware(digit, Defect::None);
-    let mut own = Own::new(Motor::new(model, generation, 3, fastest, mode)?);
+    let mut own = Actuator::new(Motor::new(model, generation, 3, fastest, mode)?);
     let mut drive = OdriveDrive::new(3, digit == 6, model.torque_constant(), 1.0);
     let mut answer = String::new();
     for ms in 1..1_300_u64 {

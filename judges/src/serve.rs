@@ -19,7 +19,7 @@
 use crate::{Defect, Outcome, model_named, register_of};
 use drivetrain::damiao::{Mode, Model, Motor};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{AngleDrive, Devices, ImpedanceControl, Own, VelocityDrive};
+use drivetrain::motor::{Actuator, AngleDrive, Devices, ImpedanceControl, VelocityDrive};
 use drivetrain::sim::{DamiaoDrive, Drive};
 use drivetrain::time::{Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
@@ -169,7 +169,7 @@ fn station(model: &Model, id: u8, mode: &str) -> Outcome<Box<dyn Station>> {
 }
 
 struct Bench {
-    own: Own<Motor>,
+    own: Actuator<Motor>,
     drive: DamiaoDrive,
     now_us: u64,
     /// What the motor has sent in the last step.
@@ -183,7 +183,7 @@ impl Bench {
         number: u8,
         mode: impl Into<Mode>,
     ) -> Outcome<Box<dyn Station>> {
-        let own = Own::new(Motor::new(*model, id, mode)?);
+        let own = Actuator::new(Motor::new(*model, id, mode)?);
         let drive = DamiaoDrive::of(*model, id).with_register(10, number.into());
         Ok(Box::new(Self { own, drive, now_us: 1_000, sent: Vec::new() }))
     }

@@ -16,7 +16,7 @@
 use crate::Outcome;
 use drivetrain::encoder::GearRatio;
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{CanDevice, Ingest, Own, OwnMotor};
+use drivetrain::motor::{Actuator, CanDevice, DriveProtocol, Ingest};
 use drivetrain::sim::{Drive, VescDrive};
 use drivetrain::time::Instant;
 use drivetrain::units::AngularVelocity;
@@ -253,7 +253,7 @@ fn faults(id: u8, input: &mut impl Read, output: &mut impl Write) -> Outcome<()>
     let (answers, []) = data.as_chunks::<8>() else { return Err("half an answer".into()) };
     let answered = ExtendedId::new(8 << 8 | 254).ok_or("no id")?;
     for answer in answers {
-        let mut own = Own::new(Motor::new(MODEL, id, Mode::current())?);
+        let mut own = Actuator::new(Motor::new(MODEL, id, Mode::current())?);
         let frame = CanFrame::new(answered, answer).ok_or("no frame")?;
         let outcome = own.ingest(&frame, Instant::from_micros(1));
         let fault = own.motor().feedback().fault;

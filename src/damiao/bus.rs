@@ -1,4 +1,4 @@
-//! The motor as an own motor: its claims, its frames, and their order.
+//! The motor as an actuator: its claims, its frames, and their order.
 
 use super::codec::{CLEAR_ERROR, Command, REGISTERS, inquiry, is_answer, refresh, value};
 use super::config::Mode;
@@ -8,7 +8,7 @@ use crate::error::ConfigError;
 use crate::frame::{CanFrame, standard_id};
 use crate::motor::Impedance;
 use crate::motor::{
-    Capabilities, Capability, Claim, Ingest, Inquiry, Malformed, MotorName, Order, OwnMotor,
+    Capabilities, Capability, Claim, DriveProtocol, Ingest, Inquiry, Malformed, MotorName, Order,
     Preparation, Role, Settings, TimeoutUnits, Vitals, WrongSetting, register_questions,
 };
 use crate::time::Duration;
@@ -35,7 +35,7 @@ const CHECKED: [Register; 4] = [
 /// # Examples
 /// ```
 /// use drivetrain::damiao::{Mode, Model, Motor};
-/// use drivetrain::motor::{Claim, OwnMotor};
+/// use drivetrain::motor::{Claim, DriveProtocol};
 /// use drivetrain::units::AngularVelocity;
 ///
 /// let mode = Mode::velocity(AngularVelocity::from_rpm(60.0));
@@ -144,7 +144,7 @@ impl Motor {
     }
 }
 
-impl OwnMotor for Motor {
+impl DriveProtocol for Motor {
     fn name(&self) -> MotorName {
         MotorName::new(self.model.name(), self.id)
     }

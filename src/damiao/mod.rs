@@ -12,7 +12,7 @@
 //! Standard frames of 8 bytes at 1 Mbit/s. A drive answers each frame with a frame, so the bus carries two a motor and cycle: at
 //! 1 kHz three motors fill the bus. Several drives may share a master id.
 //!
-//! [`Motor`] is such a drive as an [`OwnMotor`](crate::motor::OwnMotor); [`Own`](crate::motor::Own) makes a device of the motor. Its
+//! [`Motor`] is such a drive as a [`DriveProtocol`](crate::motor::DriveProtocol); [`Actuator`](crate::motor::Actuator) makes a device of the motor. Its
 //! control mode is an [`ImpedanceControl`](crate::motor::ImpedanceControl) or a [`Mode`]:
 //!
 //! | mode | targets | torque is limited by | rest is |
@@ -32,11 +32,11 @@
 //!
 //! ```
 //! use drivetrain::damiao::{Model, Motor};
-//! use drivetrain::motor::{Devices, ImpedanceControl, Own};
+//! use drivetrain::motor::{Devices, ImpedanceControl, Actuator};
 //! use drivetrain::time::Instant;
 //!
 //! let mode = ImpedanceControl::new(3.0)?.with_gains(20.0, 0.6)?; // at most 3 Nm; 20 Nm/rad and 0.6 Nm s/rad
-//! let mut joint = Own::new(Motor::new(Model::J4310, 1, mode)?);
+//! let mut joint = Actuator::new(Motor::new(Model::J4310, 1, mode)?);
 //! let refused = joint.arm(Instant::from_micros(1_000)).map_err(|error| error.to_string());
 //! assert_eq!(refused, Err("no feedback from DM-J4310 #1".into()));
 //! # Ok::<(), Box<dyn std::error::Error>>(())

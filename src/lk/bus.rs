@@ -1,4 +1,4 @@
-//! The motor as an own motor: its claims, its frames, and their order.
+//! The motor as an actuator: its claims, its frames, and their order.
 
 use super::codec::{id_of, is_command};
 use super::config::Mode;
@@ -8,7 +8,7 @@ use crate::control::PidConfig;
 use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::{
-    Capabilities, Capability, Claim, Goal, Ingest, Malformed, MotorName, Order, OwnMotor,
+    Capabilities, Capability, Claim, DriveProtocol, Goal, Ingest, Malformed, MotorName, Order,
     Questions, Role, Vitals, WrongSetting,
 };
 use crate::units::{Angle, AngularVelocity};
@@ -40,7 +40,7 @@ const ECHOES: u8 = 3;
 /// # Examples
 /// ```
 /// use drivetrain::lk::{Mode, Model, Motor};
-/// use drivetrain::motor::{Claim, OwnMotor};
+/// use drivetrain::motor::{Claim, DriveProtocol};
 /// use drivetrain::units::AngularVelocity;
 ///
 /// let mode = Mode::velocity(AngularVelocity::from_rpm(60.0));
@@ -164,7 +164,7 @@ impl Motor {
     }
 }
 
-impl OwnMotor for Motor {
+impl DriveProtocol for Motor {
     fn name(&self) -> MotorName {
         MotorName::new(self.model.name(), self.id)
     }

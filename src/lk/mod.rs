@@ -17,7 +17,7 @@
 //! A drive answers each frame within 0.25 ms, and sends nothing by itself. So the bus carries two a motor and cycle: at
 //! 1 kHz and 1 Mbit/s three motors fill the bus.
 //!
-//! [`Motor`] is such a drive as an [`OwnMotor`](crate::motor::OwnMotor); [`Own`](crate::motor::Own) makes a device of the motor. Its
+//! [`Motor`] is such a drive as a [`DriveProtocol`](crate::motor::DriveProtocol); [`Actuator`](crate::motor::Actuator) makes a device of the motor. Its
 //! control mode is an [`ImpedanceControl`](crate::motor::ImpedanceControl) or a [`Mode`]:
 //!
 //! | mode | targets | torque is limited by |
@@ -39,7 +39,7 @@
 //! drive with an error is not armed. Errors are cleared with every second frame to switch the drive off.
 //!
 //! The answer to a question is no feedback, so feedback is missing for one cycle then: a program with less than 250 updates a second has to
-//! give [`Own`](crate::motor::Own) longer [`Timeouts`](crate::motor::Timeouts).
+//! give [`Actuator`](crate::motor::Actuator) longer [`Timeouts`](crate::motor::Timeouts).
 //!
 //! **When the program stops, the drive does not.** The protocol has no time-out of the drive: no frame sets or reads one, and a drive
 //! goes on with its last command when the cable is cut. Bit 7 of the errors, on newer drives, is an input time-out; its
@@ -56,11 +56,11 @@
 //!
 //! ```
 //! use drivetrain::lk::{Model, Motor};
-//! use drivetrain::motor::{Devices, ImpedanceControl, Own};
+//! use drivetrain::motor::{Devices, ImpedanceControl, Actuator};
 //! use drivetrain::time::Instant;
 //!
 //! let mode = ImpedanceControl::new(2.0)?.with_gains(5.0, 0.2)?; // at most 2 Nm; 5 Nm/rad and 0.2 Nm s/rad
-//! let mut yaw = Own::new(Motor::new(Model::MF9025_16T, 1, mode)?);
+//! let mut yaw = Actuator::new(Motor::new(Model::MF9025_16T, 1, mode)?);
 //! let refused = yaw.arm(Instant::from_micros(1_000)).map_err(|error| error.to_string());
 //! assert_eq!(refused, Err("no feedback from MF9025-16T #1".into()));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -73,7 +73,7 @@
 //! Sources: "Motor CAN bus communication protocol" V2.35 of the vendor, as quoted by public programs: frames, ids, scales, effects of
 //! off and run, two of the error bits. The other six bits, and the current limit in bytes 2 and 3 of 0xA2, as pylkmotor 1.0.6 has
 //! them; with V2.35 these two bytes are 0. Not known: the side from which the manual sees its positive direction, called clockwise
-//! there: angles and torques have the sign of the drive, and [`Own::reversed`](crate::motor::Own::reversed) reverses both. Whether a drive counts turns while
+//! there: angles and torques have the sign of the drive, and [`Actuator::reversed`](crate::motor::Actuator::reversed) reverses both. Whether a drive counts turns while
 //! off.
 
 pub(crate) mod bus;

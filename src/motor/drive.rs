@@ -112,7 +112,7 @@ impl<H: Copy, D: AngleDrive<H>> AngleDrive<H> for &mut D {
 /// use drivetrain::dji::{AttachError, Bus, Config, Handle, M3508};
 /// use drivetrain::motor::OneOf;
 ///
-/// /// The handle of a motor in `(Bus, [Own<M>; 2])`.
+/// /// The handle of a motor in `(Bus, [Actuator<M>; 2])`.
 /// type Wheel = OneOf<Handle<M3508>, (usize, ())>;
 ///
 /// let mut bus = Bus::new();

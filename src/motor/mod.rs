@@ -19,13 +19,13 @@
 //! | [`Capabilities`] | what a motor offers: which targets, which readings |
 //! | [`MotorName`], [`Link`] | how a motor is called, and whether it is heard |
 //! | [`ArmError`], [`TargetError`] | why nothing moves |
-//! | [`OwnMotor`], [`Order`], [`Own`], [`Guard`], [`Vitals`] | a motor of your own, and the rules that make it safe |
+//! | [`DriveProtocol`], [`Order`], [`Actuator`], [`Guard`], [`Vitals`] | one motor with its drive, of a family or of your own, and the rules that make it safe |
 //! | [`StopHoming`] | finds the zero of a shaft at a mechanical stop |
 //! | [`Condition`], [`Edge`](crate::time::Edge), [`Health`] | what is wrong with a motor, each change of it, and all of it in a line |
 //! | [`HealthConfig`] | what is looked for, and what follows |
 //! | [`BusLoad`] | how full the bus is |
 //!
-//! A motor of the application joins by implementing [`OwnMotor`]: its ids, frames and loop, and of safety only the frame of
+//! A motor of the application joins by implementing [`DriveProtocol`]: its ids, frames and loop, and of safety only the frame of
 //! rest. A motor outside of this scheme implements [`CanDevice`] itself, with a [`Guard`] for each motor. Tuples and arrays
 //! of devices are [`Devices`]; a struct of devices names its parts in one method.
 //!
@@ -53,6 +53,7 @@
 //! takes targets again by itself when online. Each latch, each trip and the emergency stop begin the pause of the gesture: a request to arm
 //! is granted after 100 ms without a request. Disarming begins no pause.
 
+mod actuator;
 mod arming;
 mod capability;
 mod claim;
@@ -64,10 +65,15 @@ mod health;
 mod homing;
 mod link;
 mod load;
-mod own;
 mod safety;
 mod watch;
 
+pub use actuator::{Actuator, DriveProtocol, Impedance, ImpedanceControl, Order, Target};
+pub(crate) use actuator::{
+    ControlMode, Form, Goal, Inquiry, Preparation, Questions, Settings, Shaft, TimeoutUnits, Told,
+    TorqueLoops, code_from, ingest_eight, inside, lowest_bit, mit_model, models,
+    register_questions, registers,
+};
 pub(crate) use arming::Obstacles;
 pub use arming::{ArmError, ArmingSwitch, Missing, SwitchOrder, WrongSetting};
 pub use capability::{Capabilities, Capability};
@@ -86,12 +92,6 @@ pub use homing::{HomingStep, StopHoming};
 pub use link::{Link, Timeouts};
 pub(crate) use link::{age, is_near, take_age};
 pub use load::BusLoad;
-pub(crate) use own::{
-    ControlMode, Form, Goal, Inquiry, Preparation, Questions, Settings, Shaft, TimeoutUnits, Told,
-    TorqueLoops, code_from, ingest_eight, inside, lowest_bit, mit_model, models,
-    register_questions, registers,
-};
-pub use own::{Impedance, ImpedanceControl, Order, Own, OwnMotor, Target};
 pub use safety::OPENING;
 pub(crate) use safety::{Ages, DeviceGuard, Hold, MotorGuard, Repeat, Rest};
 pub use watch::Vitals;

@@ -174,7 +174,7 @@ impl Watch {
     }
 }
 
-/// Quantities known to an own motor beside its velocity: every known quantity is monitored.
+/// Quantities known to an actuator beside its velocity: every known quantity is monitored.
 ///
 /// Shares are relative to the largest command, current or speed without load: 0.5 is half; negative in the other
 /// direction.
@@ -197,7 +197,7 @@ pub struct Vitals {
     pub has_warning: bool,
     /// The error code, for the log.
     pub error_code: u8,
-    /// The command of the last [`control`](super::OwnMotor::control), as a share; 0 if not known, and then neither stall
+    /// The command of the last [`control`](super::DriveProtocol::control), as a share; 0 if not known, and then neither stall
     /// nor runaway is detected.
     pub effort: f32,
     /// The speed as a share of the speed without load.

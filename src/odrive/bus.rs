@@ -1,4 +1,4 @@
-//! The motor as an own motor: its claims, its frames, and their order.
+//! The motor as an actuator: its claims, its frames, and their order.
 
 use super::codec::{
     ASK_ENDPOINT, COMMANDS, Command, ENDPOINT, ERRORS, ESTIMATES, Endpoint, HEARTBEAT, endpoint,
@@ -10,8 +10,8 @@ use crate::control::PidConfig;
 use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::{
-    Capabilities, Capability, Claim, Goal, Ingest, MotorName, Order, OwnMotor, Role, Told, Vitals,
-    WrongSetting, code_from, ingest_eight, lowest_bit,
+    Capabilities, Capability, Claim, DriveProtocol, Goal, Ingest, MotorName, Order, Role, Told,
+    Vitals, WrongSetting, code_from, ingest_eight, lowest_bit,
 };
 use crate::units::{Angle, AngularVelocity};
 use core::f32::consts::TAU;
@@ -45,7 +45,7 @@ const PATIENCE: u8 = 51;
 const NOT_IDLE: u8 = 63;
 const REFUSED: u8 = 64;
 
-impl OwnMotor for Motor {
+impl DriveProtocol for Motor {
     fn name(&self) -> MotorName {
         MotorName::new(self.model.name(), self.node)
     }

@@ -15,7 +15,7 @@ use crate::units::AngularVelocity;
 ///
 /// # Examples
 /// ```
-/// use drivetrain::motor::{Claim, OwnMotor};
+/// use drivetrain::motor::{Claim, DriveProtocol};
 /// use drivetrain::odrive::{Firmware, Mode, Model, Motor};
 /// use drivetrain::units::AngularVelocity;
 ///

@@ -12,7 +12,7 @@
 //! endpoints  0x04, answer 0x05, 0.6 only        read or write | number u16 | 0 | value
 //! ```
 //! Turns, torques and currents on the wire are of the motor; the values of [`Motor`] are of the output shaft, by its
-//! [gear](Motor::with_gear). [`Own`](crate::motor::Own) makes a device of the motor. Its control
+//! [gear](Motor::with_gear). [`Actuator`](crate::motor::Actuator) makes a device of the motor. Its control
 //! mode is an [`ImpedanceControl`](crate::motor::ImpedanceControl) or a [`Mode`]:
 //!
 //! | mode | targets | torque is limited by | rest is |
@@ -58,14 +58,14 @@
 //! | 129 to 160 | a warning: the bit of the disarm reason of 0.6, from 129 |
 //!
 //! ```
-//! use drivetrain::motor::{Devices, Own};
+//! use drivetrain::motor::{Devices, Actuator};
 //! use drivetrain::odrive::{Firmware, Mode, Model, Motor};
 //! use drivetrain::time::Instant;
 //! use drivetrain::units::AngularVelocity;
 //!
 //! let fastest = AngularVelocity::from_rpm(600.0); // of the wheel
 //! let motor = Motor::new(Model::D5065, Firmware::V0_5, 3, fastest, Mode::velocity(2.0))?; // at most 2 Nm
-//! let mut wheel = Own::new(motor.with_gear(5.0)?).reversed();
+//! let mut wheel = Actuator::new(motor.with_gear(5.0)?).reversed();
 //! let refused = wheel.arm(Instant::from_micros(1_000)).map_err(|error| error.to_string());
 //! assert_eq!(refused, Err("no feedback from D5065 #3".into()));
 //! # Ok::<(), Box<dyn std::error::Error>>(())

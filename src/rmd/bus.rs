@@ -1,4 +1,4 @@
-//! The motor as an own motor: its claims, its frames, and their order.
+//! The motor as an actuator: its claims, its frames, and their order.
 
 use super::config::{Enabling, Track};
 use super::model::AMPERES_PER_COUNT;
@@ -10,7 +10,7 @@ use crate::lk::bus::{SILENT, whole};
 use crate::lk::codec::{id_of, is_command};
 use crate::lk::model::RAD_PER_DEGREE;
 use crate::motor::{
-    Capabilities, Capability, Claim, Goal, Ingest, Malformed, MotorName, Order, OwnMotor,
+    Capabilities, Capability, Claim, DriveProtocol, Goal, Ingest, Malformed, MotorName, Order,
     Questions, Role, Vitals, WrongSetting, lowest_bit,
 };
 use crate::units::{Angle, AngularVelocity};
@@ -86,7 +86,7 @@ impl Motor {
     }
 }
 
-impl OwnMotor for Motor {
+impl DriveProtocol for Motor {
     fn name(&self) -> MotorName {
         MotorName::new(self.model.name(), self.id)
     }

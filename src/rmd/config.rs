@@ -18,7 +18,7 @@ const TIMEOUT_MS: u32 = 100;
 ///
 /// # Examples
 /// ```
-/// use drivetrain::motor::{Claim, OwnMotor};
+/// use drivetrain::motor::{Claim, DriveProtocol};
 /// use drivetrain::rmd::{Mode, Model, Motor};
 /// use drivetrain::units::AngularVelocity;
 ///

@@ -19,7 +19,7 @@
 //! current has another scale, and angles and velocities are of the output shaft. A drive answers each frame with a frame:
 //! at 1 kHz and 1 Mbit/s the bus is full with three motors.
 //!
-//! [`Motor`] is such a drive as an [`OwnMotor`](crate::motor::OwnMotor); [`Own`](crate::motor::Own) makes a device of the motor. The
+//! [`Motor`] is such a drive as a [`DriveProtocol`](crate::motor::DriveProtocol); [`Actuator`](crate::motor::Actuator) makes a device of the motor. The
 //! control mode is its type:
 //!
 //! | mode | targets | torque is limited by |
@@ -35,7 +35,7 @@
 //! **Before a motor is armed** its state and its angle are read. **Before it is driven** its state is read again, and the drive has
 //! to confirm its time-out; then a torque motor has its holding brake released, as torques do not release the brake, and a position
 //! motor its angle read. The brake opens before the output does: a loaded joint sinks for the 0.2 s of
-//! [`with_opening`](crate::motor::Own::with_opening). When the motor is at rest again, the brake released by the motor is locked
+//! [`with_opening`](crate::motor::Actuator::with_opening). When the motor is at rest again, the brake released by the motor is locked
 //! 0.1 s after "off". The manual says only of torques that the brake stays locked, so with a velocity or a position the drive is left
 //! to release the brake.
 //!
@@ -48,7 +48,7 @@
 //!
 //! **The angle** of feedback is in whole degrees. Each 16th command gives way to a question for the angle in 0.01°; in between the
 //! angle moves on by the velocity, within a degree of the feedback. A question for the state takes the place of each 32nd. Their
-//! answers are no feedback, so a program with less than 250 updates a second has to give [`Own`](crate::motor::Own) longer
+//! answers are no feedback, so a program with less than 250 updates a second has to give [`Actuator`](crate::motor::Actuator) longer
 //! [`Timeouts`](crate::motor::Timeouts).
 //!
 //! **Errors** are in the state. A drive with an error is not armed. Most of them go away with their cause; the others by
@@ -60,12 +60,12 @@
 //! [`Mode::position_velocity`], feedback with a small positive current.
 //!
 //! ```
-//! use drivetrain::motor::{Devices, ImpedanceControl, Own};
+//! use drivetrain::motor::{Devices, ImpedanceControl, Actuator};
 //! use drivetrain::rmd::{Model, Motor};
 //! use drivetrain::time::Instant;
 //!
 //! let mode = ImpedanceControl::new(20.0)?.with_gains(60.0, 2.0)?; // at most 20 Nm; 60 Nm/rad and 2 Nm s/rad
-//! let mut knee = Own::new(Motor::new(Model::X8_60, 1, mode)?);
+//! let mut knee = Actuator::new(Motor::new(Model::X8_60, 1, mode)?);
 //! let refused = knee.arm(Instant::from_micros(1_000)).map_err(|error| error.to_string());
 //! assert_eq!(refused, Err("no feedback from RMD-X8-60 #1".into()));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -81,7 +81,7 @@
 //! request 4 of `myactuator_rmd_ros`. The table of the models: see [`Model`].
 //!
 //! Not known: the side from which the manual sees its positive direction: angles and torques have the sign of the drive, and
-//! [`Own::reversed`](crate::motor::Own::reversed) reverses both. Whether off locks the holding brake. Whether a drive goes on with its last command when frames
+//! [`Actuator::reversed`](crate::motor::Actuator::reversed) reverses both. Whether off locks the holding brake. Whether a drive goes on with its last command when frames
 //! come again after its time-out. If so, the command runs until the second frame of the program arrives: for one update, or for the
 //! whole time-out where only one frame gets through. So a drive that was not heard gets rest or off alone, until its feedback comes.
 //! Whether a drive answers while its brake opens: after 100 ms without an answer the motor trips, and needs longer

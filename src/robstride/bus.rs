@@ -1,4 +1,4 @@
-//! The motor as an own motor: its claims, its frames, and their order.
+//! The motor as an actuator: its claims, its frames, and their order.
 
 use super::codec::{Command, FAULTS, VALUE, answer, register};
 use super::config::Mode;
@@ -8,7 +8,7 @@ use crate::encoder::Laps;
 use crate::error::{ConfigError, check};
 use crate::frame::{CanFrame, extended_id};
 use crate::motor::{
-    Capabilities, Capability, Claim, Ingest, Inquiry, MotorName, Order, OwnMotor, Preparation,
+    Capabilities, Capability, Claim, DriveProtocol, Ingest, Inquiry, MotorName, Order, Preparation,
     Role, Settings, TimeoutUnits, Vitals, WrongSetting, code_from, ingest_eight,
     register_questions,
 };
@@ -31,7 +31,7 @@ const COMMANDS: [(u32, u32); 3] =
 ///
 /// # Examples
 /// ```
-/// use drivetrain::motor::{Claim, ImpedanceControl, OwnMotor};
+/// use drivetrain::motor::{Claim, ImpedanceControl, DriveProtocol};
 /// use drivetrain::robstride::{Model, Motor};
 ///
 /// let motor = Motor::new(Model::RS02, 1, ImpedanceControl::new(5.0)?)?; // at most 5 Nm
@@ -203,7 +203,7 @@ impl Motor {
     }
 }
 
-impl OwnMotor for Motor {
+impl DriveProtocol for Motor {
     fn name(&self) -> MotorName {
         MotorName::new(self.model.name(), self.id)
     }

@@ -14,7 +14,7 @@
 //! Extended frames of 8 bytes at 1 Mbit/s. A drive answers each frame with a frame, so the bus carries two a motor and cycle: at
 //! 1 kHz three motors fill the bus.
 //!
-//! [`Motor`] is such a drive as an [`OwnMotor`](crate::motor::OwnMotor); [`Own`](crate::motor::Own) makes a device of the motor. Its run
+//! [`Motor`] is such a drive as a [`DriveProtocol`](crate::motor::DriveProtocol); [`Actuator`](crate::motor::Actuator) makes a device of the motor. Its run
 //! mode is an [`ImpedanceControl`](crate::motor::ImpedanceControl) or a [`Mode`]:
 //!
 //! | mode | `run_mode` | targets | torque is limited by | rest is |
@@ -40,12 +40,12 @@
 //! frame writes it, and a CyberGear did not take the frame for other parameters (python-cybergear 0.1.2).
 //!
 //! ```
-//! use drivetrain::motor::{Devices, ImpedanceControl, Own};
+//! use drivetrain::motor::{Devices, ImpedanceControl, Actuator};
 //! use drivetrain::robstride::{Model, Motor};
 //! use drivetrain::time::Instant;
 //!
 //! let mode = ImpedanceControl::new(6.0)?.with_gains(40.0, 1.5)?; // at most 6 Nm; 40 Nm/rad and 1.5 Nm s/rad
-//! let mut knee = Own::new(Motor::new(Model::RS03, 127, mode)?);
+//! let mut knee = Actuator::new(Motor::new(Model::RS03, 127, mode)?);
 //! let refused = knee.arm(Instant::from_micros(1_000)).map_err(|error| error.to_string());
 //! assert_eq!(refused, Err("no feedback from RS03 #127".into()));
 //! # Ok::<(), Box<dyn std::error::Error>>(())

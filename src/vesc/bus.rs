@@ -1,4 +1,4 @@
-//! The motor as an own motor: its claims, its frames, and their order.
+//! The motor as an actuator: its claims, its frames, and their order.
 
 use super::codec::{HOST, SHORT_MESSAGE, extended, fault, question};
 use super::config::{At, Mode, Rest};
@@ -9,8 +9,8 @@ use crate::encoder::Tachometer;
 use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::{
-    Capabilities, Capability, Claim, Ingest, Malformed, MotorName, Order, OwnMotor, Role, Vitals,
-    WrongSetting,
+    Capabilities, Capability, Claim, DriveProtocol, Ingest, Malformed, MotorName, Order, Role,
+    Vitals, WrongSetting,
 };
 use crate::units::{Angle, AngularVelocity};
 use embedded_can::{Frame, Id};
@@ -37,7 +37,7 @@ const ORDERS: u8 = 50;
 /// ```
 /// use drivetrain::encoder::GearRatio;
 /// use drivetrain::frame::CanFrame;
-/// use drivetrain::motor::OwnMotor;
+/// use drivetrain::motor::DriveProtocol;
 /// use drivetrain::units::AngularVelocity;
 /// use drivetrain::vesc::{Mode, Model, Motor, Rest};
 ///
@@ -174,7 +174,7 @@ impl Motor {
     }
 }
 
-impl OwnMotor for Motor {
+impl DriveProtocol for Motor {
     fn name(&self) -> MotorName {
         MotorName::new(self.model.name, self.id)
     }

@@ -15,7 +15,7 @@
 //! Extended frames, big-endian, at the bit rate set in the drive: 500 kbit/s at delivery. The ids are 0 to 253: 254 is the id
 //! of this program, and 255 means every drive.
 //!
-//! [`Motor`] is such a drive as an [`OwnMotor`](crate::motor::OwnMotor); [`Own`](crate::motor::Own) makes a device of the motor. Its
+//! [`Motor`] is such a drive as a [`DriveProtocol`](crate::motor::DriveProtocol); [`Actuator`](crate::motor::Actuator) makes a device of the motor. Its
 //! control mode is a [`Mode`]:
 //!
 //! | mode | targets | current is limited by | a value of zero |
@@ -50,7 +50,7 @@
 //!
 //! ```
 //! use drivetrain::encoder::GearRatio;
-//! use drivetrain::motor::{Devices, Own};
+//! use drivetrain::motor::{Devices, Actuator};
 //! use drivetrain::time::Instant;
 //! use drivetrain::units::AngularVelocity;
 //! use drivetrain::vesc::{Mode, Model, Motor};
@@ -63,7 +63,7 @@
 //!     current_limit_a: 30.0,
 //!     max_velocity: AngularVelocity::from_rpm(6_000.0),
 //! };
-//! let mut shooter = Own::new(Motor::new(SHOOTER, 23, Mode::current())?);
+//! let mut shooter = Actuator::new(Motor::new(SHOOTER, 23, Mode::current())?);
 //! let refused = shooter.arm(Instant::from_micros(1_000)).map_err(|error| error.to_string());
 //! assert_eq!(refused, Err("no feedback from 5065 #23".into()));
 //! # Ok::<(), Box<dyn std::error::Error>>(())

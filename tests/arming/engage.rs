@@ -3,12 +3,12 @@
 use crate::own::{Mine, faulty, healthy, own};
 use crate::{PAUSE_MS, at_ms};
 use drivetrain::motor::Devices;
-use drivetrain::motor::{self, Guard, Ingest, Own, TargetError, Timeouts, VelocityDrive};
+use drivetrain::motor::{self, Actuator, Guard, Ingest, TargetError, Timeouts, VelocityDrive};
 use drivetrain::time::{Duration, Tick};
 use drivetrain::units::AngularVelocity;
 
 /// A motor of one's own that was heard for some time, and the time.
-fn heard() -> (Own<Mine>, u64) {
+fn heard() -> (Actuator<Mine>, u64) {
     let mut motor = own(1);
     for ms in 1_000..1_000 + PAUSE_MS {
         assert_eq!(motor.ingest(&healthy(1), at_ms(ms)), Ingest::Taken);
@@ -18,7 +18,7 @@ fn heard() -> (Own<Mine>, u64) {
 }
 
 /// Tells whether it is driven in the next milliseconds.
-fn runs(motor: &mut Own<Mine>, mut ms: u64) -> bool {
+fn runs(motor: &mut Actuator<Mine>, mut ms: u64) -> bool {
     for _ in 0..5 {
         ms += 1;
         assert_eq!(motor.ingest(&healthy(1), at_ms(ms)), Ingest::Taken);

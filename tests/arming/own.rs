@@ -2,7 +2,7 @@
 
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    Claim, Ingest, Malformed, MotorName, Order, Own, OwnMotor, Role, Target, Vitals,
+    Actuator, Claim, DriveProtocol, Ingest, Malformed, MotorName, Order, Role, Target, Vitals,
 };
 use drivetrain::units::AngularVelocity;
 use embedded_can::{Frame, Id, StandardId};
@@ -17,8 +17,8 @@ pub(crate) struct Mine {
 }
 
 /// A motor with a number below 16 that is disarmed and was not heard.
-pub(crate) fn own(id: u8) -> Own<Mine> {
-    Own::new(Mine { id, vitals: Vitals::default(), runs: 0, resets: 0 })
+pub(crate) fn own(id: u8) -> Actuator<Mine> {
+    Actuator::new(Mine { id, vitals: Vitals::default(), runs: 0, resets: 0 })
 }
 
 fn standard(raw: u16) -> Id {
@@ -46,7 +46,7 @@ pub(crate) fn rival(id: u8) -> CanFrame {
     CanFrame::new(standard(0x100 + u16::from(id)), &[7; 8]).unwrap()
 }
 
-impl OwnMotor for Mine {
+impl DriveProtocol for Mine {
     fn name(&self) -> MotorName {
         MotorName::new("mine", self.id)
     }

@@ -4,7 +4,7 @@ use crate::own::{Mine, faulty, healthy, own, rival};
 use crate::{PAUSE_MS, RIVAL_MS, at_ms};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::Devices;
-use drivetrain::motor::{ArmError, Condition, Ingest, Own, TargetError, VelocityDrive};
+use drivetrain::motor::{Actuator, ArmError, Condition, Ingest, TargetError, VelocityDrive};
 use drivetrain::time::Tick;
 use drivetrain::units::AngularVelocity;
 
@@ -12,7 +12,7 @@ use drivetrain::units::AngularVelocity;
 struct Bench<D> {
     device: D,
     count: u8,
-    part: fn(&mut D, u8) -> &mut Own<Mine>,
+    part: fn(&mut D, u8) -> &mut Actuator<Mine>,
     ms: u64,
 }
 
@@ -96,7 +96,7 @@ fn check<D: Devices>(
     name: &str,
     count: u8,
     make: fn() -> D,
-    part: fn(&mut D, u8) -> &mut Own<Mine>,
+    part: fn(&mut D, u8) -> &mut Actuator<Mine>,
 ) {
     let new = || Bench { device: make(), count, part, ms: 1_000 };
     for number in 1..=count {
@@ -248,7 +248,7 @@ fn disarm_of_all<D: Devices>(mut bench: Bench<D>, case: &str) {
 }
 
 /// A motor that somebody else owns, for as long as the test program runs.
-fn lent(number: u8) -> &'static mut Own<Mine> {
+fn lent(number: u8) -> &'static mut Actuator<Mine> {
     Box::leak(Box::new(own(number)))
 }
 

@@ -4,7 +4,7 @@ use crate::own::{faulty, healthy, own};
 use crate::{PAUSE_MS, at_ms};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::Devices;
-use drivetrain::motor::{ArmError, Ingest, Own, TargetError, VelocityDrive};
+use drivetrain::motor::{Actuator, ArmError, Ingest, TargetError, VelocityDrive};
 use drivetrain::runner::{EmergencyStop, Nb, Runner};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::AngularVelocity;
@@ -33,7 +33,7 @@ impl embedded_can::nb::Can for Driver {
     }
 }
 
-type Motors = [Own<crate::own::Mine>; 2];
+type Motors = [Actuator<crate::own::Mine>; 2];
 type Robot<'c> = Runner<Nb<Driver>, &'c Cell<Instant>, Motors>;
 
 fn robot(clock: &Cell<Instant>) -> Robot<'_> {

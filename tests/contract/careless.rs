@@ -32,8 +32,8 @@ enum Mistake {
     ArmsAgainAndAgain,
 }
 
-/// An own motor with a mistake of its maker in front of it; what it was told last, and whether that was refused.
-struct Careless(Own<MyMotor>, Mistake, Option<CanFrame>, f32, bool);
+/// An actuator with a mistake of its maker in front of it; what it was told last, and whether that was refused.
+struct Careless(Actuator<MyMotor>, Mistake, Option<CanFrame>, f32, bool);
 
 impl CanDevice for Careless {
     fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
@@ -123,7 +123,7 @@ impl CanDevice for Careless {
     }
     fn engage(&mut self, now: Instant) {
         if self.1 == Mistake::ArmsAgainAndAgain && !self.0.is_armed() {
-            self.0 = Own::new(MyMotor::new(3).unwrap());
+            self.0 = Actuator::new(MyMotor::new(3).unwrap());
             let heard = CanFrame::new(id(0x143), &[0, 0, 30]).unwrap();
             _ = CanDevice::ingest(&mut self.0, &heard, now);
         }
@@ -157,7 +157,7 @@ impl Devices for Careless {
 
 fn careless(mistake: Mistake) -> Result<usize, Violation> {
     check_contract(|| Mixed {
-        device: Careless(Own::new(MyMotor::new(3).unwrap()), mistake, None, 0.0, false),
+        device: Careless(Actuator::new(MyMotor::new(3).unwrap()), mistake, None, 0.0, false),
         ids: vec![0x143],
         drive: |device: &mut Careless, share| {
             let share = match device.1 {
@@ -404,7 +404,7 @@ fn the_check_finds_what_a_struct_of_devices_does_not_forward() {
     }
 }
 
-/// What the loop of an own motor gets wrong.
+/// What the loop of an actuator gets wrong.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Haste {
     None,
@@ -417,7 +417,7 @@ enum Haste {
 /// A motor whose command is its torque in percent of the largest, 2 Nm.
 struct Hasty(Haste);
 
-impl OwnMotor for Hasty {
+impl DriveProtocol for Hasty {
     fn name(&self) -> MotorName {
         MotorName::new("hasty", 1)
     }
@@ -454,11 +454,11 @@ impl OwnMotor for Hasty {
     }
 }
 
-struct HastySubject(Own<Hasty>, bool);
+struct HastySubject(Actuator<Hasty>, bool);
 
 impl Subject for HastySubject {
-    type Device = Own<Hasty>;
-    fn device(&mut self) -> &mut Own<Hasty> {
+    type Device = Actuator<Hasty>;
+    fn device(&mut self) -> &mut Actuator<Hasty> {
         &mut self.0
     }
     fn motors(&self) -> usize {
@@ -484,7 +484,7 @@ fn the_check_finds_a_loop_that_drives_at_once_or_without_a_limit() {
         (Haste::OpensTooEarly, true, Err(Rule::OpensFromZero)),
         (Haste::HasNoLimit, true, Err(Rule::OpensFromZero)),
     ] {
-        let checked = check_contract(|| HastySubject(Own::new(Hasty(haste)), knows_effort));
+        let checked = check_contract(|| HastySubject(Actuator::new(Hasty(haste)), knows_effort));
         assert_eq!(checked.map_err(|violation| violation.rule), found, "{haste:?}");
     }
 }

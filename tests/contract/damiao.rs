@@ -8,11 +8,11 @@ use drivetrain::sim::{DamiaoDrive, Drive as _};
 use drivetrain::units::Angle;
 use std::cell::{Cell, RefCell};
 
-type Drive = fn(&mut Own<Motor>, f32) -> Result<(), TargetError>;
+type Drive = fn(&mut Actuator<Motor>, f32) -> Result<(), TargetError>;
 
 /// A motor, and a drive whose shaft stands.
 struct Joint {
-    motor: Own<Motor>,
+    motor: Actuator<Motor>,
     drive: RefCell<DamiaoDrive>,
     /// An answer about a register, which the motor takes before all else.
     answer: Cell<Option<CanFrame>>,
@@ -23,7 +23,7 @@ impl Joint {
     fn new(mode: impl Into<Mode>, number: f32, set: Drive) -> Self {
         let drive = DamiaoDrive::of(Model::J4310, 1).with_register(10, number);
         Self {
-            motor: Own::new(Motor::new(Model::J4310, 1, mode).unwrap()),
+            motor: Actuator::new(Motor::new(Model::J4310, 1, mode).unwrap()),
             drive: RefCell::new(drive),
             answer: Cell::new(None),
             set,
@@ -36,7 +36,7 @@ impl Joint {
 }
 
 impl Subject for Joint {
-    type Device = Own<Motor>;
+    type Device = Actuator<Motor>;
     fn device(&mut self) -> &mut Self::Device {
         if let Some(answer) = self.answer.take() {
             self.motor.motor_mut().decode_answer(&answer);

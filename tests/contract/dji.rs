@@ -82,14 +82,17 @@ fn tuples_and_arrays_of_buses_keep_the_contract() {
 
 #[test]
 fn the_motor_of_the_example_keeps_the_contract_alone_and_beside_dji_motors() {
-    let alone =
-        || Mixed { device: Own::new(MyMotor::new(3).unwrap()), ids: vec![0x143], drive: drive_own };
+    let alone = || Mixed {
+        device: Actuator::new(MyMotor::new(3).unwrap()),
+        ids: vec![0x143],
+        drive: drive_own,
+    };
     assert_eq!(check_contract(alone), Ok(RULES));
     let beside = || Mixed {
         device: (
             bus::<M3508>(&[1]),
-            Own::new(MyMotor::new(3).unwrap()),
-            Own::new(MyMotor::new(4).unwrap()),
+            Actuator::new(MyMotor::new(3).unwrap()),
+            Actuator::new(MyMotor::new(4).unwrap()),
         ),
         ids: vec![0x201, 0x143, 0x144],
         drive: |(bus, third, fourth), share| {

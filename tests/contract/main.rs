@@ -20,7 +20,8 @@ use drivetrain::control::PidConfig;
 use drivetrain::dji::{AnyHandle, Bus, Config, Model};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    Claim, Devices, Ingest, MotorName, Order, Own, OwnMotor, TargetError, VelocityDrive, Vitals,
+    Actuator, Claim, Devices, DriveProtocol, Ingest, MotorName, Order, TargetError, VelocityDrive,
+    Vitals,
 };
 use drivetrain::sim::contract::{Subject, check_contract};
 use drivetrain::units::AngularVelocity;
@@ -85,7 +86,7 @@ fn drive_all(bus: &mut Bus, share: f32) -> Result<(), TargetError> {
     bus.drive(motors.into_iter().map(|motor| (motor, velocity(share))))
 }
 
-fn drive_own(motor: &mut Own<MyMotor>, share: f32) -> Result<(), TargetError> {
+fn drive_own(motor: &mut Actuator<MyMotor>, share: f32) -> Result<(), TargetError> {
     motor.set_velocity((), velocity(share))
 }
 
@@ -102,7 +103,7 @@ impl Block {
     }
 }
 
-impl OwnMotor for Block {
+impl DriveProtocol for Block {
     fn name(&self) -> MotorName {
         self.0.name()
     }
@@ -134,11 +135,11 @@ impl OwnMotor for Block {
 // At d71443a: `ClaimsFeedback` broken, and `SendsWhatItClaims`, as the check looked at the first id of a block only.
 #[test]
 fn motors_that_claim_blocks_of_ids_keep_the_contract() {
-    let motor = |id| Own::new(Block(MyMotor::new(id).unwrap(), 0));
+    let motor = |id| Actuator::new(Block(MyMotor::new(id).unwrap(), 0));
     let made = || Mixed {
         device: [motor(1), motor(2)],
         ids: vec![0x145, 0x14E],
-        drive: |motors: &mut [Own<Block>; 2], share| {
+        drive: |motors: &mut [Actuator<Block>; 2], share| {
             let [first, second] =
                 motors.each_mut().map(|motor| motor.set_velocity((), velocity(share)));
             first.and(second)

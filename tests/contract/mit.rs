@@ -9,11 +9,11 @@ use drivetrain::wire::mit;
 mod mit_motor;
 use mit_motor::J4310;
 
-type Drive = fn(&mut Own<J4310>, f32) -> Result<(), TargetError>;
+type Drive = fn(&mut Actuator<J4310>, f32) -> Result<(), TargetError>;
 
 /// Two motors whose drives always say that they are enabled.
 struct Pair {
-    motors: [Own<J4310>; 2],
+    motors: [Actuator<J4310>; 2],
     /// The ids of their answers: each its own, or one for both.
     masters: [u16; 2],
     drive: Drive,
@@ -22,8 +22,8 @@ struct Pair {
 impl Pair {
     fn new(masters: [u16; 2], drive: Drive) -> Self {
         let [first, second] = masters;
-        let motors =
-            [(1, first), (2, second)].map(|(id, master)| Own::new(J4310::new(id, master).unwrap()));
+        let motors = [(1, first), (2, second)]
+            .map(|(id, master)| Actuator::new(J4310::new(id, master).unwrap()));
         Self { motors, masters, drive }
     }
 
@@ -35,7 +35,7 @@ impl Pair {
 }
 
 impl Subject for Pair {
-    type Device = [Own<J4310>; 2];
+    type Device = [Actuator<J4310>; 2];
     fn device(&mut self) -> &mut Self::Device {
         &mut self.motors
     }

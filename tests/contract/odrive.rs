@@ -7,11 +7,11 @@ use drivetrain::sim::{Drive as _, OdriveDrive};
 use drivetrain::units::Angle;
 use std::cell::{Cell, RefCell};
 
-type Drive = fn(&mut Own<Motor>, f32) -> Result<(), TargetError>;
+type Drive = fn(&mut Actuator<Motor>, f32) -> Result<(), TargetError>;
 
 /// A motor, and an axis whose shaft stands.
 struct Axle {
-    motor: Own<Motor>,
+    motor: Actuator<Motor>,
     drive: RefCell<OdriveDrive>,
     /// From when a fault was played first, each heartbeat has it, but for those between feedback and the next frames of the motor.
     fails: Cell<bool>,
@@ -30,7 +30,7 @@ impl Axle {
         let constant = Model::D6374.torque_constant();
         let drive = OdriveDrive::new(3, firmware == Firmware::V0_6, constant, 1.0);
         Self {
-            motor: Own::new(motor),
+            motor: Actuator::new(motor),
             drive: RefCell::new(drive),
             fails: Cell::new(false),
             is_well: Cell::new(true),
@@ -40,7 +40,7 @@ impl Axle {
 }
 
 impl Subject for Axle {
-    type Device = Own<Motor>;
+    type Device = Actuator<Motor>;
     /// A heartbeat has come before whatever is asked of the motor.
     fn device(&mut self) -> &mut Self::Device {
         let mut drive = *self.drive.borrow();

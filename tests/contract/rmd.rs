@@ -8,11 +8,11 @@ use drivetrain::sim::{Drive as _, RmdDrive};
 use drivetrain::units::Angle;
 use std::cell::{Cell, RefCell};
 
-type Drive = fn(&mut Own<Motor>, f32) -> Result<(), TargetError>;
+type Drive = fn(&mut Actuator<Motor>, f32) -> Result<(), TargetError>;
 
 /// A motor, and a drive whose shaft stands.
 struct Wheel {
-    motor: Own<Motor>,
+    motor: Actuator<Motor>,
     drive: RefCell<RmdDrive>,
     /// An answer that is no feedback, which the motor takes before all else.
     answer: Cell<Option<CanFrame>>,
@@ -22,7 +22,7 @@ struct Wheel {
 impl Wheel {
     fn new(mode: impl Into<Mode>, set: Drive) -> Self {
         Self {
-            motor: Own::new(Motor::new(Model::X8_120, 1, mode).unwrap()),
+            motor: Actuator::new(Motor::new(Model::X8_120, 1, mode).unwrap()),
             drive: RefCell::new(RmdDrive::new(1, 2.4)),
             answer: Cell::new(None),
             set,
@@ -35,7 +35,7 @@ impl Wheel {
 }
 
 impl Subject for Wheel {
-    type Device = Own<Motor>;
+    type Device = Actuator<Motor>;
     fn device(&mut self) -> &mut Self::Device {
         if let Some(answer) = self.answer.take() {
             self.motor.motor_mut().decode_answer(&answer);

@@ -9,11 +9,11 @@ use drivetrain::units::Angle;
 use embedded_can::ExtendedId;
 use std::cell::{Cell, RefCell};
 
-type Drive = fn(&mut Own<Motor>, f32) -> Result<(), TargetError>;
+type Drive = fn(&mut Actuator<Motor>, f32) -> Result<(), TargetError>;
 
 /// A motor, and a drive whose shaft stands.
 struct Joint {
-    motor: Own<Motor>,
+    motor: Actuator<Motor>,
     drive: RefCell<RobStrideDrive>,
     /// An answer about a parameter, which the motor takes before all else.
     answer: Cell<Option<CanFrame>>,
@@ -23,7 +23,7 @@ struct Joint {
 impl Joint {
     fn new(model: Model, mode: impl Into<Mode>, set: Drive) -> Self {
         Self {
-            motor: Own::new(Motor::new(model, 1, mode).unwrap()),
+            motor: Actuator::new(Motor::new(model, 1, mode).unwrap()),
             drive: RefCell::new(RobStrideDrive::of(model, 1)),
             answer: Cell::new(None),
             set,
@@ -38,7 +38,7 @@ impl Joint {
 }
 
 impl Subject for Joint {
-    type Device = Own<Motor>;
+    type Device = Actuator<Motor>;
     fn device(&mut self) -> &mut Self::Device {
         if let Some(answer) = self.answer.take() {
             self.motor.motor_mut().decode_answer(&answer);

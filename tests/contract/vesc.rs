@@ -8,7 +8,7 @@ use drivetrain::units::Angle;
 use drivetrain::vesc::{Mode, Model, Motor, Rest};
 use std::cell::{Cell, RefCell};
 
-type Drive = fn(&mut Own<Motor>, f32) -> Result<(), TargetError>;
+type Drive = fn(&mut Actuator<Motor>, f32) -> Result<(), TargetError>;
 
 const MODEL: Model = Model {
     name: "6374",
@@ -21,7 +21,7 @@ const MODEL: Model = Model {
 
 /// A motor, and a drive whose shaft stands.
 struct Station {
-    motor: Own<Motor>,
+    motor: Actuator<Motor>,
     drive: RefCell<VescDrive>,
     /// An answer about the fault code, which the motor takes before all else.
     answer: Cell<Option<CanFrame>>,
@@ -33,12 +33,18 @@ impl Station {
     fn new(mode: Mode, rest: Rest, set: Drive) -> Self {
         let drive = VescDrive::of(MODEL, 23).with_current_max(40.0);
         let motor = Motor::new(MODEL, 23, mode).unwrap().with_rest(rest).unwrap();
-        Self { motor: Own::new(motor), drive: drive.into(), answer: Cell::new(None), set, rest }
+        Self {
+            motor: Actuator::new(motor),
+            drive: drive.into(),
+            answer: Cell::new(None),
+            set,
+            rest,
+        }
     }
 }
 
 impl Subject for Station {
-    type Device = Own<Motor>;
+    type Device = Actuator<Motor>;
     fn device(&mut self) -> &mut Self::Device {
         if let Some(answer) = self.answer.take() {
             self.motor.motor_mut().decode_answer(&answer);

@@ -2,13 +2,13 @@
 
 use drivetrain::damiao::{Mode, Model, Motor};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{Devices, ImpedanceControl, Ingest, Own};
+use drivetrain::motor::{Actuator, Devices, ImpedanceControl, Ingest};
 use drivetrain::sim::{DamiaoDrive, Drive};
 use drivetrain::time::{Instant, Tick};
 
 /// A motor and its drive on a bus that loses nothing.
 pub(crate) struct Bench {
-    pub(crate) own: Own<Motor>,
+    pub(crate) own: Actuator<Motor>,
     pub(crate) drive: DamiaoDrive,
     pub(crate) now_us: u64,
     /// The frames of the last update.
@@ -20,7 +20,7 @@ pub(crate) struct Bench {
 
 impl Bench {
     pub(crate) fn new(mode: impl Into<Mode>, number: f32) -> Self {
-        let own = Own::new(Motor::new(Model::J4310, 1, mode).unwrap());
+        let own = Actuator::new(Motor::new(Model::J4310, 1, mode).unwrap());
         let drive = DamiaoDrive::of(Model::J4310, 1).with_register(10, number);
         Self { own, drive, now_us: 1_000, frames: Vec::new(), is_cut: false, passes: |_| true }
     }

@@ -17,7 +17,7 @@ use drivetrain::control::PidConfig;
 use drivetrain::damiao::{Mode, Model, Motor, Register};
 use drivetrain::error::ConfigError;
 use drivetrain::motor::{
-    AngleDrive, Devices, Impedance, ImpedanceControl, Own, TargetError, VelocityDrive,
+    Actuator, AngleDrive, Devices, Impedance, ImpedanceControl, TargetError, VelocityDrive,
 };
 use drivetrain::sim::{DamiaoDrive, Drive, DriveShaft};
 use drivetrain::time::{Duration, Instant, Tick};
@@ -159,8 +159,9 @@ fn nothing_jumps_when_a_motor_far_from_its_target_is_armed() {
 #[test]
 fn two_motors_with_one_master_id_are_told_apart() {
     let mode = mit();
-    let motor =
-        |id| Own::new(Motor::new(Model::J4310, id, mode).unwrap().with_master_id(0x10).unwrap());
+    let motor = |id| {
+        Actuator::new(Motor::new(Model::J4310, id, mode).unwrap().with_master_id(0x10).unwrap())
+    };
     let mut robot = [motor(1), motor(2)];
     let drive = |id| DamiaoDrive::of(Model::J4310, id).with_register(7, 16.0);
     let mut drives = [drive(1), drive(2)];

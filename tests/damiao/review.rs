@@ -5,7 +5,8 @@ use super::bench::{Bench, mit};
 use drivetrain::damiao::{Mode, Model, Motor, Register};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    AngleDrive, Devices, Impedance, ImpedanceControl, Order, Own, OwnMotor, Target, VelocityDrive,
+    Actuator, AngleDrive, Devices, DriveProtocol, Impedance, ImpedanceControl, Order, Target,
+    VelocityDrive,
 };
 use drivetrain::sim::{DamiaoDrive, Drive, DriveShaft};
 use drivetrain::time::Tick;
@@ -279,7 +280,7 @@ fn velocity_mode_does_not_jump_to_a_velocity_measured_long_before() {
 
 /// A drive whose supply sags while it is enabled (the inrush of all motors at once) has lost its TIMEOUT, and its settings. It should not be
 /// enabled before it has confirmed TIMEOUT anew.
-fn sags(mode: impl Into<Mode> + Copy, number: f32, gap: u32, set: impl Fn(&mut Own<Motor>)) {
+fn sags(mode: impl Into<Mode> + Copy, number: f32, gap: u32, set: impl Fn(&mut Actuator<Motor>)) {
     let mut bad = Vec::new();
     for at in 0..60 {
         let mut bench = Bench::armed(mode, number);
@@ -341,7 +342,7 @@ fn a_range_that_a_sag_brought_back_is_noticed() {
     assert!(bad.is_empty(), "1 Nm was asked for, after a sag at tick: {bad:?}");
 }
 
-/// Another tool changes TMAX while the motor is driven. `OwnMotor::inquire`: "a setting is read before the motor is armed and again
+/// Another tool changes TMAX while the motor is driven. `DriveProtocol::inquire`: "a setting is read before the motor is armed and again
 /// before it is armed next". It is not: disarmed and armed at once, the motor takes what it read before.
 #[test]
 fn settings_are_read_again_before_a_motor_is_armed_again() {
@@ -542,7 +543,7 @@ impl Random {
 fn storm(
     mode: impl Into<Mode> + Copy,
     number: f32,
-    set: impl Fn(&mut Own<Motor>, f32),
+    set: impl Fn(&mut Actuator<Motor>, f32),
     sags: bool,
     writes: bool,
 ) {
@@ -1035,7 +1036,7 @@ fn a_shared_command_of_an_own_motor_can_be_given_back() {
     use drivetrain::motor::{Claim, Ingest, MotorName, Role};
     use embedded_can::StandardId;
     struct Shared;
-    impl OwnMotor for Shared {
+    impl DriveProtocol for Shared {
         fn name(&self) -> MotorName {
             MotorName::new("shared", 1)
         }
@@ -1058,7 +1059,7 @@ fn a_shared_command_of_an_own_motor_can_be_given_back() {
         }
         fn reset(&mut self) {}
     }
-    let mut own = Own::new(Shared);
+    let mut own = Actuator::new(Shared);
     own.update(Tick::new(drivetrain::time::Instant::from_micros(1_000), 0.001));
     let frame = own.next_frame(0).unwrap();
     assert!(own.requeue(&frame), "{frame:?}");
@@ -1107,7 +1108,7 @@ fn rest_that_the_driver_refused_gives_way_to_no_other_frame() {
 fn a_damper_still_brakes_a_joint_that_is_faster_than_vmax() {
     let gains = ImpedanceControl::new(25.0).unwrap().with_gains(8.0, 0.8).unwrap();
     let mut bench = Bench::new(mit(), 1.0);
-    bench.own = Own::new(Motor::new(Model::J4340, 1, gains).unwrap());
+    bench.own = Actuator::new(Motor::new(Model::J4340, 1, gains).unwrap());
     let shaft = DriveShaft::new(0.02, 0.0);
     bench.drive = DamiaoDrive::of(Model::J4340, 1).with_shaft(shaft);
     bench.steps(200, |_| {});

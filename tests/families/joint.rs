@@ -6,8 +6,8 @@ use drivetrain::control::PidConfig;
 use drivetrain::error::ConfigError;
 use drivetrain::math::wrap_pi;
 use drivetrain::motor::{
-    AngleDrive, Condition, Devices, Impedance, ImpedanceControl, Ingest, Link, Own, OwnMotor,
-    TargetError,
+    Actuator, AngleDrive, Condition, Devices, DriveProtocol, Impedance, ImpedanceControl, Ingest,
+    Link, TargetError,
 };
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{DamiaoDrive, Drive, DriveShaft, Line, RobStrideDrive, Simulation};
@@ -125,8 +125,8 @@ fn lacks_its_zero(mut station: Station, family: &str) {
 }
 
 /// Tries to change the loops of a motor, with good and with bad gains.
-fn change(motor: Result<impl OwnMotor, ConfigError>) -> [Result<(), ConfigError>; 2] {
-    let mut own = Own::new(motor.unwrap());
+fn change(motor: Result<impl DriveProtocol, ConfigError>) -> [Result<(), ConfigError>; 2] {
+    let mut own = Actuator::new(motor.unwrap());
     let position = PidConfig::new(8.0, 0.0, 0.0).with_output_limit(10.0);
     [0.4, -0.4].map(|kp| own.set_loops(position, PidConfig::new(kp, 2.0, 0.0)))
 }
@@ -187,7 +187,7 @@ fn the_turns_of_a_joint_with_a_zero_stay_whatever_happens_to_its_drive() {
         (0.0, Event::Error, false),
     ] {
         let motor = damiao::Motor::new(damiao::Model::J4310, 1, gains()).unwrap();
-        let mut joint = Own::new(motor);
+        let mut joint = Actuator::new(motor);
         if !found {
             joint = joint.with_zero(Angle::from_radians(3.0)).unwrap();
         }
@@ -243,18 +243,19 @@ fn the_turns_of_a_joint_with_a_zero_stay_whatever_happens_to_its_drive() {
 #[test]
 fn a_zero_is_given_to_drives_alone_that_know_their_angle() {
     let zero = Angle::from_radians(0.3);
-    let of =
-        |motor: Result<robstride::Motor, ConfigError>| Own::new(motor.unwrap()).with_zero(zero);
+    let of = |motor: Result<robstride::Motor, ConfigError>| {
+        Actuator::new(motor.unwrap()).with_zero(zero)
+    };
     assert!(of(robstride::Motor::new(robstride::Model::RS02, 1, gains())).is_ok());
     let counting = of(robstride::Motor::new(robstride::Model::CYBERGEAR, 1, gains())).err();
     assert_eq!(counting, Some(ConfigError::Unsupported("zero")));
     let wheel = vesc::Motor::new(VESC, 23, vesc::Mode::current()).unwrap();
-    assert!(Own::new(wheel).with_zero(zero).is_err());
-    assert!(Own::new(wheel.with_encoder()).with_zero(zero).is_ok());
+    assert!(Actuator::new(wheel).with_zero(zero).is_err());
+    assert!(Actuator::new(wheel.with_encoder()).with_zero(zero).is_ok());
     let joint = lk::Motor::new(lk::Model::MF9025_16T, 1, gains()).unwrap();
-    assert!(Own::new(joint).with_zero(zero).is_err());
+    assert!(Actuator::new(joint).with_zero(zero).is_err());
     let known = damiao::Motor::new(damiao::Model::J4310, 1, gains()).unwrap();
-    let refused = Own::new(known).with_zero(Angle::from_radians(f32::NAN)).err();
+    let refused = Actuator::new(known).with_zero(Angle::from_radians(f32::NAN)).err();
     assert_eq!(refused, Some(ConfigError::NotFinite("zero")));
 }
 
@@ -273,7 +274,7 @@ fn brown_out(
     let mut drive = RobStrideDrive::of(model, 1).with_shaft(DriveShaft::new(0.05, 0.5));
     drive.shaft_mut().set_angle(start);
     let mode = ImpedanceControl::new(5.0).unwrap();
-    let joint = Own::new(robstride::Motor::new(model, 1, mode).unwrap());
+    let joint = Actuator::new(robstride::Motor::new(model, 1, mode).unwrap());
     let mut runner = Runner::new(Nb(world.controller()), world.clock(), joint);
     let (mut before, mut turned, mut faults) = (None, 0.0_f32, false);
     for ms in 0..3_000_u64 {

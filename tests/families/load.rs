@@ -1,4 +1,4 @@
-//! No motor puts more on the bus than `Own::load` says, from power-on through arming, driving and a trip, and a driven one nearly as much.
+//! No motor puts more on the bus than `Actuator::load` says, from power-on through arming, driving and a trip, and a driven one nearly as much.
 
 use crate::motors::FAMILIES;
 use crate::station::Station;

@@ -5,7 +5,9 @@ use crate::station::Station;
 use drivetrain::control::PidConfig;
 use drivetrain::encoder::GearRatio;
 use drivetrain::error::ConfigError;
-use drivetrain::motor::{AngleDrive, ImpedanceControl, Own, OwnMotor, TargetError, VelocityDrive};
+use drivetrain::motor::{
+    Actuator, AngleDrive, DriveProtocol, ImpedanceControl, TargetError, VelocityDrive,
+};
 use drivetrain::sim::{DamiaoDrive, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive};
 use drivetrain::time::Duration;
 use drivetrain::units::{Angle, AngularVelocity};
@@ -172,15 +174,15 @@ fn mit(torque_nm: f32) -> ImpedanceControl {
     ImpedanceControl::new(torque_nm).unwrap().with_gains(20.0, 0.6).unwrap()
 }
 
-fn torque<M: OwnMotor>(own: &mut Own<M>, share: f32) -> Result<(), TargetError> {
+fn torque<M: DriveProtocol>(own: &mut Actuator<M>, share: f32) -> Result<(), TargetError> {
     own.set_torque(0.8 * share)
 }
 
-fn velocity<M: OwnMotor>(own: &mut Own<M>, share: f32) -> Result<(), TargetError> {
+fn velocity<M: DriveProtocol>(own: &mut Actuator<M>, share: f32) -> Result<(), TargetError> {
     own.set_velocity((), AngularVelocity::from_rad_per_s(6.0 * share))
 }
 
-fn angle<M: OwnMotor>(own: &mut Own<M>, share: f32) -> Result<(), TargetError> {
+fn angle<M: DriveProtocol>(own: &mut Actuator<M>, share: f32) -> Result<(), TargetError> {
     own.set_angle((), Angle::from_radians(1.5 * share))
 }
 

@@ -4,7 +4,7 @@
 
 use drivetrain::damiao::{Mode, Model, Motor};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{Devices, ImpedanceControl, Own, VelocityDrive};
+use drivetrain::motor::{Actuator, Devices, ImpedanceControl, VelocityDrive};
 use drivetrain::robstride;
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{
@@ -45,8 +45,9 @@ impl<'w> embedded_can::nb::Can for Driver<'w> {
 fn fewest_commands<const N: usize>(only_refuses: bool, period_us: u32, poll_us: u32) -> usize {
     let (world, model) = (Simulation::new(1), Model::J4310);
     let mode = || Mode::velocity(AngularVelocity::from_rpm(100.0));
-    let joints: [_; N] =
-        core::array::from_fn(|index| Own::new(Motor::new(model, index as u8 + 1, mode()).unwrap()));
+    let joints: [_; N] = core::array::from_fn(|index| {
+        Actuator::new(Motor::new(model, index as u8 + 1, mode()).unwrap())
+    });
     let mut drives: [_; N] = core::array::from_fn(|index| {
         let drive = DamiaoDrive::of(model, index as u8 + 1);
         drive.with_register(10, 3.0).with_shaft(DriveShaft::new(0.02, 0.02))
@@ -113,7 +114,7 @@ fn a_cable_that_is_out_for_a_moment_is_no_bus_that_is_down() {
         let (world, model) = (Simulation::new(1), robstride::Model::RS02);
         let mode = || ImpedanceControl::new(5.0).unwrap();
         let joints =
-            [1, 2, 3].map(|id| Own::new(robstride::Motor::new(model, id, mode()).unwrap()));
+            [1, 2, 3].map(|id| Actuator::new(robstride::Motor::new(model, id, mode()).unwrap()));
         let mut drives = [1, 2, 3]
             .map(|id| RobStrideDrive::of(model, id).with_shaft(DriveShaft::new(0.25, 0.5)));
         let period = Duration::from_micros(period_us);
@@ -173,7 +174,7 @@ fn a_question_that_never_leaves_beside_commands_that_do_is_a_bus_that_is_down() 
     let mode = ImpedanceControl::new(5.0).unwrap();
     let motor = robstride::Motor::new(robstride::Model::RS02, 1, mode).unwrap();
     let can = Picky { refused: [0x03, 0x11], received: None };
-    let mut runner = Runner::new(Nb(can), &clock, Own::new(motor));
+    let mut runner = Runner::new(Nb(can), &clock, Actuator::new(motor));
     for _ in 0..150 {
         clock.set(clock.get() + Duration::from_millis(1));
         let feedback = [0x7F, 0xFF, 0x7F, 0xFF, 0x7F, 0xFF, 1, 0];

@@ -1,7 +1,7 @@
 //! Questions in the place of commands, of the families whose drives answer either.
 
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{ImpedanceControl, Order, OwnMotor, Target};
+use drivetrain::motor::{DriveProtocol, ImpedanceControl, Order, Target};
 use drivetrain::time::TimeStep;
 use drivetrain::{lk, rmd};
 
@@ -10,7 +10,7 @@ fn is_torque(frame: &CanFrame) -> bool {
 }
 
 /// While a drive answers a question, it goes on with its last command. If that command was not sent, the drive has an older one.
-fn never_follow_a_command_that_was_not_sent(mut motor: impl OwnMotor) {
+fn never_follow_a_command_that_was_not_sent(mut motor: impl DriveProtocol) {
     let step = TimeStep::of(0.001);
     let order = Order { target: Target::Torque(1.0), share: 1.0, step };
     let (mut questions, mut is_lost) = (0, false);

@@ -3,8 +3,8 @@
 use crate::drives::{raw, with_id};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    AngleDrive, ArmError, BusLoad, CanDevice, Claim, Conditions, Devices, HealthConfig, Ingest,
-    Link, Own, OwnMotor, TargetError, VelocityDrive,
+    Actuator, AngleDrive, ArmError, BusLoad, CanDevice, Claim, Conditions, Devices, DriveProtocol,
+    HealthConfig, Ingest, Link, TargetError, VelocityDrive,
 };
 use drivetrain::sim::DriveShaft;
 use drivetrain::time::{Instant, Tick};
@@ -38,12 +38,12 @@ pub(crate) trait Device {
     fn load(&self) -> BusLoad;
 }
 
-pub(crate) type Set<M> = fn(&mut Own<M>, f32) -> Result<(), TargetError>;
+pub(crate) type Set<M> = fn(&mut Actuator<M>, f32) -> Result<(), TargetError>;
 
 /// A motor, and the target that it is driven to.
-pub(crate) struct Driven<M>(pub(crate) Own<M>, pub(crate) Set<M>);
+pub(crate) struct Driven<M>(pub(crate) Actuator<M>, pub(crate) Set<M>);
 
-impl<M: OwnMotor + Copy> Device for Driven<M> {
+impl<M: DriveProtocol + Copy> Device for Driven<M> {
     fn update(&mut self, tick: Tick) {
         Devices::update(&mut self.0, tick);
     }
@@ -189,15 +189,15 @@ pub(crate) struct Station {
 pub(crate) type Bend = Box<dyn FnMut(&dyn Drive, &CanFrame) -> Vec<CanFrame>>;
 
 impl Station {
-    pub(crate) fn new<M: OwnMotor + Copy + 'static>(
+    pub(crate) fn new<M: DriveProtocol + Copy + 'static>(
         motor: M,
         set: Set<M>,
         drive: impl Drive + 'static,
     ) -> Self {
-        let mut twins = [Own::new(motor), Own::new(motor)];
+        let mut twins = [Actuator::new(motor), Actuator::new(motor)];
         Self {
             twins: Devices::arm(&mut twins, Instant::from_micros(1_000)),
-            device: Box::new(Driven(Own::new(motor), set)),
+            device: Box::new(Driven(Actuator::new(motor), set)),
             drive: Box::new(drive),
             now_us: 1_000,
             dt_s: 0.001,

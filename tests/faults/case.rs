@@ -1,6 +1,6 @@
 //! A row of the catalogue as a program: a function that returns its observation, or fails.
 
-use drivetrain::motor::{Own, OwnMotor};
+use drivetrain::motor::{Actuator, DriveProtocol};
 use std::any::type_name;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -43,7 +43,7 @@ pub(crate) fn take_seen() -> Seen {
 }
 
 /// Notes the family of a motor that the case drives, by the module of its type.
-pub(crate) fn drives<M: OwnMotor>(_motor: &Own<M>) {
+pub(crate) fn drives<M: DriveProtocol>(_motor: &Actuator<M>) {
     let family = type_name::<M>().split("::").nth(1).unwrap_or_default();
     SEEN.with_borrow_mut(|seen| seen.families.insert(family));
 }

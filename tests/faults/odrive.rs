@@ -2,7 +2,7 @@
 
 use crate::axle::{Bench, torque};
 use crate::case::{Case, cases, drives, saw};
-use drivetrain::motor::{Devices, OwnMotor, VelocityDrive};
+use drivetrain::motor::{Devices, DriveProtocol, VelocityDrive};
 use drivetrain::odrive::{Firmware, Heartbeat, Mode};
 use drivetrain::units::AngularVelocity;
 

@@ -5,7 +5,7 @@ use crate::case::{Case, cases, drives, saw};
 use crate::rmd_bench::{Bench, torque};
 use crate::robstride_bench as robstride;
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{Devices, ImpedanceControl, Own, VelocityDrive};
+use drivetrain::motor::{Actuator, Devices, ImpedanceControl, VelocityDrive};
 use drivetrain::rmd::{Mode, Model};
 use drivetrain::time::Tick;
 use drivetrain::units::AngularVelocity;
@@ -66,7 +66,7 @@ fn f90_a_drive_that_does_not_confirm_its_timeout_is_not_driven() {
     assert!(refused.contains("CanRecvTime_MS 0, the program needs 100"), "{refused}");
     saw(refused);
     // It is the program that may do without.
-    bench.own = Own::new(bench.own.motor().without_timeout());
+    bench.own = Actuator::new(bench.own.motor().without_timeout());
     bench.steps(100, |_| {});
     bench.own.arm(bench.now()).unwrap();
     bench.steps(500, |bench| bench.own.set_velocity((), rad_s(6.0)).unwrap());

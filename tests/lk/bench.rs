@@ -2,13 +2,13 @@
 
 use drivetrain::frame::CanFrame;
 use drivetrain::lk::{Mode, Model, Motor};
-use drivetrain::motor::{Devices, ImpedanceControl, Ingest, Own};
+use drivetrain::motor::{Actuator, Devices, ImpedanceControl, Ingest};
 use drivetrain::sim::{Drive, LkDrive};
 use drivetrain::time::{Instant, Tick};
 
 /// A motor and its drive on a bus that loses nothing.
 pub(crate) struct Bench {
-    pub(crate) own: Own<Motor>,
+    pub(crate) own: Actuator<Motor>,
     pub(crate) drive: LkDrive,
     pub(crate) now_us: u64,
     /// The frames of the last update.
@@ -18,7 +18,7 @@ pub(crate) struct Bench {
 
 impl Bench {
     pub(crate) fn new(model: Model, mode: impl Into<Mode>) -> Self {
-        let own = Own::new(Motor::new(model, 1, mode).unwrap());
+        let own = Actuator::new(Motor::new(model, 1, mode).unwrap());
         Self { own, drive: drive_of(&model), now_us: 1_000, frames: Vec::new(), is_cut: false }
     }
 

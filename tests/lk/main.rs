@@ -11,8 +11,8 @@ use drivetrain::control::PidConfig;
 use drivetrain::frame::CanFrame;
 use drivetrain::lk::{Mode, Model, Motor, Series};
 use drivetrain::motor::{
-    AngleDrive, Condition, Devices, Impedance, ImpedanceControl, Ingest, Link, Own, OwnMotor,
-    VelocityDrive,
+    Actuator, AngleDrive, Condition, Devices, DriveProtocol, Impedance, ImpedanceControl, Ingest,
+    Link, VelocityDrive,
 };
 use drivetrain::sim::{Drive, DriveShaft};
 use drivetrain::time::{Instant, Tick};
@@ -369,7 +369,7 @@ fn an_echo_is_never_feedback() {
 /// A driver that hands back what was sent, without a drive.
 #[test]
 fn commands_that_are_read_back_are_no_feedback_and_count_as_another_controller() {
-    fn looped(mode: impl Into<Mode>, set: fn(&mut Own<Motor>)) {
+    fn looped(mode: impl Into<Mode>, set: fn(&mut Actuator<Motor>)) {
         let mut bench = Bench::armed(Model::MF9025_16T, mode);
         for tick in 0..400 {
             set(&mut bench.own);
@@ -460,7 +460,7 @@ fn turns_are_counted_over_the_ends_of_each_encoder() {
 /// Questions take the place of commands, and their answers are no feedback: none of them makes a motor late.
 #[test]
 fn a_motor_that_is_updated_250_times_a_second_is_never_late() {
-    fn runs(mode: impl Into<Mode>, set: fn(&mut Own<Motor>)) {
+    fn runs(mode: impl Into<Mode>, set: fn(&mut Actuator<Motor>)) {
         let mut bench = Bench::new(Model::MF9025_16T, mode);
         let mut off = 0;
         for tick in 0..2_000_u32 {
@@ -484,8 +484,8 @@ fn a_motor_that_is_updated_250_times_a_second_is_never_late() {
 }
 
 #[test]
-fn two_motors_on_a_bus_hear_their_own_drives_alone() {
-    let motor = |id| Own::new(Motor::new(Model::MF9025_16T, id, torque()).unwrap());
+fn two_motors_on_a_bus_hear_their_actuator_drives_alone() {
+    let motor = |id| Actuator::new(Motor::new(Model::MF9025_16T, id, torque()).unwrap());
     let mut robot = [motor(1), motor(2)];
     let mut drives = [1, 2].map(|id| drivetrain::sim::LkDrive::of(Model::MF9025_16T, id));
     for ms in 0..1_200_u64 {

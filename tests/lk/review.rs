@@ -21,7 +21,7 @@ fn both_directions_on_one_id_clash_with_each_other_motor_on_it() {
 /// 0 in the field of a limit stands for none with some drives, and the share of the output is 0 right after arming.
 #[test]
 fn a_limit_is_never_sent_as_none() {
-    fn limits(mode: impl Into<Mode>, set: fn(&mut Own<Motor>), code: u8) -> Vec<u16> {
+    fn limits(mode: impl Into<Mode>, set: fn(&mut Actuator<Motor>), code: u8) -> Vec<u16> {
         let mut bench = Bench::armed(Model::MF9025_16T, mode);
         let mut limits = Vec::new();
         bench.steps(400, |bench| {

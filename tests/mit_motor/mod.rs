@@ -4,7 +4,7 @@ use drivetrain::frame::CanFrame;
 use drivetrain::math::wrap_pi;
 use drivetrain::motor::Impedance;
 use drivetrain::motor::{Capabilities, Capability, Claim, Ingest, Malformed, MotorName, Order};
-use drivetrain::motor::{OwnMotor, Role, Target, Vitals};
+use drivetrain::motor::{DriveProtocol, Role, Target, Vitals};
 use drivetrain::units::{Angle, AngularVelocity};
 use drivetrain::wire::mit::{self, Feedback, Ranges};
 use embedded_can::{Frame, Id, StandardId};
@@ -62,7 +62,7 @@ impl J4310 {
     }
 }
 
-impl OwnMotor for J4310 {
+impl DriveProtocol for J4310 {
     fn name(&self) -> MotorName {
         MotorName::new("DM-J4310", self.id)
     }

@@ -1,7 +1,7 @@
 //! A motor at an ODrive and its simulated drive.
 
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{Devices, ImpedanceControl, Ingest, Own};
+use drivetrain::motor::{Actuator, Devices, ImpedanceControl, Ingest};
 use drivetrain::odrive::{Firmware, Mode, Model, Motor};
 use drivetrain::sim::{Drive, OdriveDrive};
 use drivetrain::time::{Instant, Tick};
@@ -12,7 +12,7 @@ pub(crate) const GEAR: f32 = 5.0;
 
 /// A motor and its drive on a bus that loses nothing.
 pub(crate) struct Bench {
-    pub(crate) own: Own<Motor>,
+    pub(crate) own: Actuator<Motor>,
     pub(crate) drive: OdriveDrive,
     pub(crate) now_us: u64,
     /// The frames of the last update.
@@ -39,7 +39,7 @@ impl Bench {
         let is_0_6 = motor.claims_endpoints();
         let constant = Model::D6374.torque_constant();
         let drive = OdriveDrive::new(3, is_0_6, constant, gear).with_periods(0.1, 0.002);
-        let own = Own::new(motor);
+        let own = Actuator::new(motor);
         Self {
             own,
             drive,
@@ -117,7 +117,7 @@ trait Generation {
 
 impl Generation for Motor {
     fn claims_endpoints(&self) -> bool {
-        use drivetrain::motor::OwnMotor;
+        use drivetrain::motor::DriveProtocol;
         self.claims()
             .into_iter()
             .any(|claim| claim.to_string().ends_with("feedback of D6374 #3 on 0x65"))

@@ -12,7 +12,7 @@ use drivetrain::control::PidConfig;
 use drivetrain::error::ConfigError;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    AngleDrive, Condition, Devices, Ingest, Malformed, Own, OwnMotor, VelocityDrive,
+    Actuator, AngleDrive, Condition, Devices, DriveProtocol, Ingest, Malformed, VelocityDrive,
 };
 use drivetrain::odrive::{Endpoints, Feedback, Firmware, Heartbeat, Mode, Model, Motor};
 use drivetrain::sim::{Drive, DriveShaft, OdriveDrive};
@@ -620,7 +620,7 @@ fn a_stop_is_sent_until_the_heartbeat_has_it() {
 
 #[test]
 fn frames_that_are_damaged_or_of_others_change_nothing() {
-    let mut own = Own::new(motor(torque(), Firmware::V0_5));
+    let mut own = Actuator::new(motor(torque(), Firmware::V0_5));
     let now = drivetrain::time::Instant::from_micros(1_000);
     let good = [0x00, 0x00, 0x44, 0x41, 0x00, 0x00, 0x60, 0xC0];
     let id = |raw| StandardId::new(raw).unwrap();

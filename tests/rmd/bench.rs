@@ -1,14 +1,14 @@
 //! A motor of MyActuator and its simulated drive.
 
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{Devices, ImpedanceControl, Ingest, Own};
+use drivetrain::motor::{Actuator, Devices, ImpedanceControl, Ingest};
 use drivetrain::rmd::{Mode, Model, Motor};
 use drivetrain::sim::{Drive, RmdDrive};
 use drivetrain::time::{Instant, Tick};
 
 /// A motor and its drive on a bus that loses nothing.
 pub(crate) struct Bench {
-    pub(crate) own: Own<Motor>,
+    pub(crate) own: Actuator<Motor>,
     pub(crate) drive: RmdDrive,
     pub(crate) now_us: u64,
     /// The frames of the last update.
@@ -20,7 +20,7 @@ pub(crate) struct Bench {
 
 impl Bench {
     pub(crate) fn new(model: Model, mode: impl Into<Mode>) -> Self {
-        let own = Own::new(Motor::new(model, 1, mode).unwrap());
+        let own = Actuator::new(Motor::new(model, 1, mode).unwrap());
         let drive = RmdDrive::new(1, model.torque_constant());
         Self { own, drive, now_us: 1_000, frames: Vec::new(), is_cut: false, refused: None }
     }

@@ -11,8 +11,8 @@ use drivetrain::control::PidConfig;
 use drivetrain::error::ConfigError;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    AngleDrive, Condition, Devices, Impedance, ImpedanceControl, Ingest, Link, Malformed, Own,
-    OwnMotor, Timeouts, VelocityDrive,
+    Actuator, AngleDrive, Condition, Devices, DriveProtocol, Impedance, ImpedanceControl, Ingest,
+    Link, Malformed, Timeouts, VelocityDrive,
 };
 use drivetrain::rmd::{Mode, Model, Motor};
 use drivetrain::sim::Drive;
@@ -90,7 +90,7 @@ fn rests(mut bench: Bench) {
 
 #[test]
 fn a_reversed_motor_turns_the_other_way_in_each_mode() {
-    fn turns(mode: impl Into<Mode>, set: fn(&mut Own<Motor>)) -> (f32, f32) {
+    fn turns(mode: impl Into<Mode>, set: fn(&mut Actuator<Motor>)) -> (f32, f32) {
         let mut bench = Bench::new(MODEL, mode);
         bench.own = bench.own.reversed();
         bench.steps(100, |_| {});
@@ -245,7 +245,7 @@ fn a_drive_that_does_not_take_its_timeout_is_not_driven_and_the_error_names_it()
     assert!(refused.starts_with(text), "{refused}");
 
     let motor = *bench.own.motor();
-    bench.own = Own::new(motor.without_timeout());
+    bench.own = Actuator::new(motor.without_timeout());
     bench.steps(100, |_| {});
     bench.own.arm(bench.now()).unwrap();
     bench.steps(500, |bench| bench.own.set_velocity((), rad_s(6.0)).unwrap());
@@ -292,7 +292,7 @@ fn the_timeout_is_not_written_again_and_again() {
 /// before when frames come again, so the second frame is rest or off, whatever question is due by then.
 #[test]
 fn a_drive_whose_cable_is_cut_stops_and_does_not_go_on_by_itself() {
-    fn stops(mode: impl Into<Mode>, set: fn(&mut Own<Motor>), cut_ms: u32) {
+    fn stops(mode: impl Into<Mode>, set: fn(&mut Actuator<Motor>), cut_ms: u32) {
         let mode = mode.into();
         let mut bench = Bench::armed(MODEL, mode);
         bench.steps(800, |bench| set(&mut bench.own));
@@ -329,7 +329,7 @@ fn a_drive_that_timed_out_unnoticed_trips_the_motor() {
         let ages = [60, 200].map(Duration::from_millis);
         let patient = Timeouts::new().with_feedback(ages[0], ages[1]).unwrap();
         let motor = motor.with_timeout(Duration::from_millis(20)).unwrap();
-        bench.own = Own::new(motor).with_timeouts(patient);
+        bench.own = Actuator::new(motor).with_timeouts(patient);
         bench.steps(100, |_| {});
         bench.own.arm(bench.now()).unwrap();
         bench.steps(500, |bench| bench.own.set_velocity((), rad_s(6.0)).unwrap());
@@ -485,7 +485,7 @@ fn a_frame_of_another_length_is_malformed_and_changes_nothing() {
 /// Questions take the place of commands, and their answers are no feedback: none of them makes a motor late.
 #[test]
 fn a_motor_that_is_updated_250_times_a_second_is_never_late() {
-    fn runs(mode: impl Into<Mode>, set: fn(&mut Own<Motor>)) {
+    fn runs(mode: impl Into<Mode>, set: fn(&mut Actuator<Motor>)) {
         let mut bench = Bench::new(MODEL, mode);
         for tick in 0..2_000_u32 {
             bench.now_us += 3_000;
@@ -507,8 +507,8 @@ fn a_motor_that_is_updated_250_times_a_second_is_never_late() {
 }
 
 #[test]
-fn two_motors_on_a_bus_hear_their_own_drives_alone() {
-    let motor = |id| Own::new(Motor::new(MODEL, id, torque()).unwrap());
+fn two_motors_on_a_bus_hear_their_actuator_drives_alone() {
+    let motor = |id| Actuator::new(Motor::new(MODEL, id, torque()).unwrap());
     let mut robot = [motor(1), motor(2)];
     let drive = |id| drivetrain::sim::RmdDrive::new(id, 2.4);
     let mut drives = [drive(1), drive(2)];

@@ -43,7 +43,7 @@ fn a_question_that_is_sent_back_is_no_answer() {
 /// Each mode, and each command of it that could be sent back by a drive whose time is over.
 #[test]
 fn a_command_that_is_sent_back_is_never_feedback() {
-    fn heard(mode: impl Into<Mode>, set: fn(&mut Own<Motor>)) {
+    fn heard(mode: impl Into<Mode>, set: fn(&mut Actuator<Motor>)) {
         let mode = mode.into();
         let mut bench = Bench::armed(MODEL, mode);
         bench.steps(400, |bench| set(&mut bench.own));

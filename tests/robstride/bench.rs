@@ -1,14 +1,14 @@
 //! A motor of RobStride and its simulated drive.
 
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{Devices, ImpedanceControl, Ingest, Own};
+use drivetrain::motor::{Actuator, Devices, ImpedanceControl, Ingest};
 use drivetrain::robstride::{Mode, Model, Motor};
 use drivetrain::sim::{Drive, RobStrideDrive};
 use drivetrain::time::{Instant, Tick};
 
 /// A motor and its drive on a bus that loses nothing unless told.
 pub(crate) struct Bench {
-    pub(crate) own: Own<Motor>,
+    pub(crate) own: Actuator<Motor>,
     pub(crate) drive: RobStrideDrive,
     pub(crate) now_us: u64,
     /// The frames of the last update.
@@ -28,7 +28,7 @@ impl Bench {
     }
 
     pub(crate) fn of(model: Model, mode: impl Into<Mode>) -> Self {
-        let own = Own::new(Motor::new(model, 1, mode).unwrap());
+        let own = Actuator::new(Motor::new(model, 1, mode).unwrap());
         Self {
             own,
             drive: RobStrideDrive::of(model, 1),

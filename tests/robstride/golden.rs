@@ -4,7 +4,7 @@ use crate::bench::{Bench, operation};
 use crate::extended;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::Impedance;
-use drivetrain::motor::{Devices, OwnMotor};
+use drivetrain::motor::{Devices, DriveProtocol};
 use drivetrain::robstride::{Command, Feedback, Model, Motor, Register, Status};
 use drivetrain::units::{Angle, AngularVelocity};
 use serde_json::Value;
@@ -121,7 +121,8 @@ fn feedback() {
 fn a_parameter() {
     let vector = vector("robstride.manual.loc_kp");
     let mut bench = Bench::new(operation());
-    bench.own = drivetrain::motor::Own::new(Motor::new(Model::RS00, 127, operation()).unwrap());
+    bench.own =
+        drivetrain::motor::Actuator::new(Motor::new(Model::RS00, 127, operation()).unwrap());
     bench.own.motor_mut().read(Register::PositionKp);
     for _ in 0..200 {
         bench.step();

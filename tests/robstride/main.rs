@@ -13,7 +13,7 @@ use drivetrain::control::PidConfig;
 use drivetrain::error::ConfigError;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    AngleDrive, ArmError, Condition, Devices, Impedance, ImpedanceControl, MotorName, Own,
+    Actuator, AngleDrive, ArmError, Condition, Devices, Impedance, ImpedanceControl, MotorName,
     TargetError, VelocityDrive,
 };
 use drivetrain::robstride::{Mode, Model, Motor, Register, Status};
@@ -411,7 +411,7 @@ fn the_zero_and_the_id_are_set_while_the_motor_is_disarmed_only() {
 
 #[test]
 fn two_motors_on_one_bus_are_told_apart() {
-    let motor = |id| Own::new(Motor::new(Model::RS02, id, operation()).unwrap());
+    let motor = |id| Actuator::new(Motor::new(Model::RS02, id, operation()).unwrap());
     let mut robot = [motor(1), motor(2)];
     let mut drives = [1, 2].map(|id| RobStrideDrive::of(Model::RS02, id));
     let mut now = Instant::from_micros(0);
@@ -443,17 +443,17 @@ fn two_motors_on_one_bus_are_told_apart() {
 fn a_host_id_that_is_a_motor_on_the_bus_clashes() {
     let motor = |id| Motor::new(Model::RS02, id, operation()).unwrap();
     assert!(motor(1).with_host_id(1).is_err());
-    let first = Own::new(motor(1).with_host_id(2).unwrap());
-    let clashes = |first: &Own<_>, second: &Own<_>| {
+    let first = Actuator::new(motor(1).with_host_id(2).unwrap());
+    let clashes = |first: &Actuator<_>, second: &Actuator<_>| {
         use drivetrain::motor::CanDevice;
         CanDevice::claims(first).any(|claim| {
             CanDevice::claims(second)
                 .any(|other: drivetrain::motor::Claim| claim.clashes_with(&other))
         })
     };
-    assert!(clashes(&first, &Own::new(motor(2))));
-    assert!(!clashes(&Own::new(motor(1)), &Own::new(motor(2))));
-    assert!(clashes(&Own::new(motor(1)), &Own::new(motor(1))));
+    assert!(clashes(&first, &Actuator::new(motor(2))));
+    assert!(!clashes(&Actuator::new(motor(1)), &Actuator::new(motor(2))));
+    assert!(clashes(&Actuator::new(motor(1)), &Actuator::new(motor(1))));
 }
 
 #[test]
@@ -507,6 +507,6 @@ trait Named {
 
 impl Named for Motor {
     fn name_is(&self) -> String {
-        drivetrain::motor::OwnMotor::name(self).to_string()
+        drivetrain::motor::DriveProtocol::name(self).to_string()
     }
 }

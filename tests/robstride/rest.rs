@@ -3,7 +3,7 @@
 use crate::bench::{Bench, operation};
 use crate::{index, kind, rad_per_s};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{AngleDrive, Devices, Own, VelocityDrive};
+use drivetrain::motor::{Actuator, AngleDrive, Devices, VelocityDrive};
 use drivetrain::robstride::{Mode, Model, Motor};
 use drivetrain::units::Angle;
 
@@ -19,7 +19,7 @@ fn is_rest(frame: &CanFrame) -> bool {
     }
 }
 
-type Set = fn(&mut Own<Motor>);
+type Set = fn(&mut Actuator<Motor>);
 
 #[derive(Debug, Clone, Copy)]
 enum Event {

@@ -10,13 +10,13 @@
 //! | edges | an edge found in a frame has the time of the update before (`dji::Motors::change`) | dji | 60 |
 //! | edges | feedback ends *late* and leaves *offline* (`MotorGuard::hear`) | guard | 120 |
 //! | edges | an edge that was read waits on (`Latch::take`) | guard | 60 |
-//! | opening | a drive that is enabled again does not open anew (`Own::reopen`) | damiao, MIT | 2040 |
+//! | opening | a drive that is enabled again does not open anew (`Actuator::reopen`) | damiao, MIT | 2040 |
 //! | opening | a millisecond of the opening has 1024 µs (`MotorGuard::share`) | guard | 120 |
 //! | opening | a motor that resumes does not open anew (`MotorGuard::hear`) | dji that resumes | 30 060 |
 //! | opening | the second arming does not open anew (`MotorGuard::open`) | guard | 840 |
 //! | opening | after a pause the beginning may lie ahead (was in the crate) | guard without feedback | 3420 |
 //! | second master | the window has 1.05 s (`Rival`) | dji | 3300 |
-//! | second master | its claim is named for ever (`Own::second_master`) | dji and own | 120 |
+//! | second master | its claim is named for ever (`Actuator::second_master`) | dji and own | 120 |
 //! | second master | a command of other motors counts (`dji::watch::hear_command`) | dji | 120 |
 //! | second master | a frame ahead of the update is one of long ago (was in the crate) | dji | 2940 |
 //! | second master | it stays until a clock that was set back has caught up (was in the crate) | dji and own | 2100 |

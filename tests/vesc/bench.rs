@@ -3,7 +3,7 @@
 use drivetrain::control::PidConfig;
 use drivetrain::encoder::GearRatio;
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{Devices, Ingest, Own};
+use drivetrain::motor::{Actuator, Devices, Ingest};
 use drivetrain::sim::{Drive, VescDrive};
 use drivetrain::time::{Instant, Tick};
 use drivetrain::units::AngularVelocity;
@@ -25,7 +25,7 @@ pub(crate) fn drive(id: u8) -> VescDrive {
 
 /// A motor and its drive on a bus that loses nothing. The drive reports at 1 kHz.
 pub(crate) struct Bench {
-    pub(crate) own: Own<Motor>,
+    pub(crate) own: Actuator<Motor>,
     pub(crate) drive: VescDrive,
     pub(crate) now_us: u64,
     /// The frames of the last update.
@@ -38,7 +38,7 @@ pub(crate) struct Bench {
 impl Bench {
     pub(crate) fn of(motor: Motor) -> Self {
         Self {
-            own: Own::new(motor),
+            own: Actuator::new(motor),
             drive: drive(23),
             now_us: 1_000,
             frames: Vec::new(),

@@ -11,7 +11,7 @@ use drivetrain::encoder::GearRatio;
 use drivetrain::error::ConfigError;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    AngleDrive, Condition, Devices, Ingest, Own, TargetError, Timeouts, VelocityDrive,
+    Actuator, AngleDrive, Condition, Devices, Ingest, TargetError, Timeouts, VelocityDrive,
 };
 use drivetrain::sim::Drive;
 use drivetrain::sim::DriveShaft;
@@ -337,7 +337,7 @@ fn a_motor_is_armed_when_the_drive_has_said_that_it_has_no_fault() {
 fn a_drive_that_never_answers_is_armed_only_where_the_program_says_so() {
     for asks in [true, false] {
         let motor = Motor::new(MODEL, 23, Mode::current()).unwrap();
-        let mut own = Own::new(if asks { motor } else { motor.without_fault_code() });
+        let mut own = Actuator::new(if asks { motor } else { motor.without_fault_code() });
         let mut now = Instant::START;
         for ms in 1..200 {
             now = Instant::from_micros(1_000 * ms);
@@ -452,7 +452,7 @@ fn the_drive_stops_by_itself_after_its_own_time_out() {
 fn two_drives_on_a_bus_with_neighbouring_ids_hear_only_their_own() {
     let motor = |id| {
         let mode = Mode::current_with_speed_loop(SPEED).unwrap();
-        Own::new(Motor::new(MODEL, id, mode).unwrap())
+        Actuator::new(Motor::new(MODEL, id, mode).unwrap())
     };
     let mut robot = [motor(0), motor(253)];
     let mut drives = [drive(0), drive(253)];
@@ -655,7 +655,7 @@ fn a_velocity_target_keeps_within_the_largest_of_the_model() {
 /// Heat opens less of the range: 5 A of 20 A at a quarter.
 #[test]
 fn the_share_of_the_order_scales_the_current() {
-    use drivetrain::motor::{Order, OwnMotor, Target};
+    use drivetrain::motor::{DriveProtocol, Order, Target};
     use drivetrain::time::TimeStep;
     for (share, expected) in [(1.0, 20_000), (0.25, 5_000), (0.0, 0)] {
         for (target, sign) in [
@@ -677,7 +677,7 @@ fn the_share_of_the_order_scales_the_current() {
 /// The velocity loop takes over from the torque before it, and leaves it.
 #[test]
 fn a_velocity_after_a_torque_begins_with_the_current_of_the_torque() {
-    use drivetrain::motor::{Order, OwnMotor, Target};
+    use drivetrain::motor::{DriveProtocol, Order, Target};
     use drivetrain::time::TimeStep;
     let mut motor = Motor::new(MODEL, 23, looped()).unwrap();
     _ = motor.decode(&drive(23).report(9).unwrap());

@@ -3,7 +3,7 @@ use crate::yaw::yaw;
 use drivetrain::damiao::{Model, Motor};
 use drivetrain::dji::Bus;
 use drivetrain::encoder::Position;
-use drivetrain::motor::{AngleDrive, ImpedanceControl, Own};
+use drivetrain::motor::{AngleDrive, ImpedanceControl, Actuator};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{DamiaoDrive, DriveShaft, Line, MotorConfig, Simulation};
 use drivetrain::time::Duration;
@@ -20,7 +20,7 @@ fn a_damiao_joint_tilts_beside_the_yaw_motor() {
     let mut bus = Bus::<Upper>::branded();
     let yaw = bus.attach(yaw()).unwrap();
     let mode = ImpedanceControl::new(3.0).unwrap().with_gains(20.0, 1.0).unwrap(); // Nm, Nm/rad, Nm s/rad
-    let pitch = Own::new(Motor::new(Model::J4310, 1, mode).unwrap());
+    let pitch = Actuator::new(Motor::new(Model::J4310, 1, mode).unwrap());
     // A tuple of devices is a device: armed, stopped and watched together.
     let controller = Nb(world.controller_on(Line::Can2));
     let mut runner = Runner::new(controller, world.clock(), (bus, pitch));

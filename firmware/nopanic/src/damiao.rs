@@ -4,7 +4,7 @@ use crate::functions::{device, family};
 use crate::opaque::Function;
 use drivetrain::damiao::*;
 use drivetrain::motor::{
-    AngleDrive, Impedance, ImpedanceControl, Order, Own, OwnMotor, VelocityDrive,
+    Actuator, AngleDrive, DriveProtocol, Impedance, ImpedanceControl, Order, VelocityDrive,
 };
 
 pub fn call_all() {
@@ -63,10 +63,10 @@ fn motor() {
     Motor::wrong_setting.call();
     Motor::forget_settings.call();
     Motor::poll.call();
-    Own::<Motor>::set_impedance.call();
-    Own::<Motor>::motor_mut.call();
-    (|own: &mut Own<Motor>, target| own.set_velocity((), target)).call();
-    (|own: &mut Own<Motor>, target| own.set_angle((), target)).call();
-    family::<Own<Motor>>();
-    device::<Own<Motor>>();
+    Actuator::<Motor>::set_impedance.call();
+    Actuator::<Motor>::motor_mut.call();
+    (|own: &mut Actuator<Motor>, target| own.set_velocity((), target)).call();
+    (|own: &mut Actuator<Motor>, target| own.set_angle((), target)).call();
+    family::<Actuator<Motor>>();
+    device::<Actuator<Motor>>();
 }

@@ -12,9 +12,9 @@ use drivetrain::error::ConfigError;
 use drivetrain::frame::CanFrame;
 use drivetrain::math::{atan2, sin_cos, sqrt, wrap, wrap_pi, wrap_positive, wrap_tau};
 use drivetrain::motor::{
-    AngleDrive, ArmingSwitch, BusLoad, CanDevice, Capabilities, Capability, Claim, Devices, Guard,
-    Ingest, Measured, Missing, MotorName, Order, Own, OwnMotor, Role, StopHoming, Timeouts,
-    VelocityDrive, Visitor, Vitals, WrongSetting,
+    Actuator, AngleDrive, ArmingSwitch, BusLoad, CanDevice, Capabilities, Capability, Claim,
+    Devices, DriveProtocol, Guard, Ingest, Measured, Missing, MotorName, Order, Role, StopHoming,
+    Timeouts, VelocityDrive, Visitor, Vitals, WrongSetting,
 };
 use drivetrain::runner::{
     BlockingTx, EmergencyStop, FrameQueue, FrameReceiver, FrameSender, Nb, Runner, Statistics,
@@ -298,26 +298,27 @@ fn motor() {
     StopHoming::new.call();
     StopHoming::step.call();
     StopHoming::is_done.call();
-    Own::<AnyMotor>::new.call();
-    Own::<AnyMotor>::with_timeouts.call();
-    Own::<AnyMotor>::motor.call();
-    Own::<AnyMotor>::guard.call();
-    Own::<AnyMotor>::with_health.call();
-    Own::<AnyMotor>::health.call();
-    Own::<AnyMotor>::with_opening.call();
-    Own::<AnyMotor>::reversed.call();
-    Own::<AnyMotor>::with_zero.call();
-    Own::<AnyMotor>::set_present_angle.call();
-    Own::<AnyMotor>::set_loops.call();
-    Own::<AnyMotor>::set_torque.call();
-    Own::<AnyMotor>::set_impedance.call();
-    Own::<AnyMotor>::motor_mut.call();
-    Own::<AnyMotor>::load.call();
-    (|own: &mut Own<AnyMotor>, target| own.set_velocity((), target)).call();
-    (|own: &mut Own<AnyMotor>, target| own.set_angle((), target)).call();
-    (|own: &Own<AnyMotor>| (own.velocity(()), own.angle(()))).call();
-    family::<Own<AnyMotor>>();
-    device::<Own<AnyMotor>>();
+    Actuator::<AnyMotor>::new.call();
+    Actuator::<AnyMotor>::with_timeouts.call();
+    Actuator::<AnyMotor>::motor.call();
+    Actuator::<AnyMotor>::guard.call();
+    Actuator::<AnyMotor>::with_health.call();
+    Actuator::<AnyMotor>::health.call();
+    Actuator::<AnyMotor>::with_opening.call();
+    Actuator::<AnyMotor>::reversed.call();
+    Actuator::<AnyMotor>::with_zero.call();
+    Actuator::<AnyMotor>::set_present_angle.call();
+    Actuator::<AnyMotor>::forget_zero.call();
+    Actuator::<AnyMotor>::set_loops.call();
+    Actuator::<AnyMotor>::set_torque.call();
+    Actuator::<AnyMotor>::set_impedance.call();
+    Actuator::<AnyMotor>::motor_mut.call();
+    Actuator::<AnyMotor>::load.call();
+    (|own: &mut Actuator<AnyMotor>, target| own.set_velocity((), target)).call();
+    (|own: &mut Actuator<AnyMotor>, target| own.set_angle((), target)).call();
+    (|own: &Actuator<AnyMotor>| (own.velocity(()), own.angle(()))).call();
+    family::<Actuator<AnyMotor>>();
+    device::<Actuator<AnyMotor>>();
     MotorName::new.call();
     MotorName::model.call();
     MotorName::id.call();
@@ -332,7 +333,7 @@ fn motor() {
 /// Devices of a user that name their parts.
 struct Robot {
     chassis: [Bus; 2],
-    arm: Own<AnyMotor>,
+    arm: Actuator<AnyMotor>,
 }
 
 impl Devices for Robot {
@@ -493,7 +494,7 @@ fn dji() {
 /// A motor of a user that may do anything.
 struct AnyMotor;
 
-impl OwnMotor for AnyMotor {
+impl DriveProtocol for AnyMotor {
     fn name(&self) -> MotorName {
         any()
     }

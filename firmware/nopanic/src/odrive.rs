@@ -2,7 +2,7 @@
 
 use crate::functions::{device, family};
 use crate::opaque::Function;
-use drivetrain::motor::{AngleDrive, ImpedanceControl, Own, OwnMotor, VelocityDrive};
+use drivetrain::motor::{Actuator, AngleDrive, DriveProtocol, ImpedanceControl, VelocityDrive};
 use drivetrain::odrive::*;
 
 pub fn call_all() {
@@ -40,11 +40,11 @@ fn motor() {
     Motor::poll.call();
     Motor::enable.call();
     Motor::disable.call();
-    Own::<Motor>::set_torque.call();
-    Own::<Motor>::set_impedance.call();
-    Own::<Motor>::motor_mut.call();
-    (|own: &mut Own<Motor>, target| own.set_velocity((), target)).call();
-    (|own: &mut Own<Motor>, target| own.set_angle((), target)).call();
-    family::<Own<Motor>>();
-    device::<Own<Motor>>();
+    Actuator::<Motor>::set_torque.call();
+    Actuator::<Motor>::set_impedance.call();
+    Actuator::<Motor>::motor_mut.call();
+    (|own: &mut Actuator<Motor>, target| own.set_velocity((), target)).call();
+    (|own: &mut Actuator<Motor>, target| own.set_angle((), target)).call();
+    family::<Actuator<Motor>>();
+    device::<Actuator<Motor>>();
 }

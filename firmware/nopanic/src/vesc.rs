@@ -2,7 +2,7 @@
 
 use crate::functions::{device, family};
 use crate::opaque::Function;
-use drivetrain::motor::{AngleDrive, Own, OwnMotor, VelocityDrive};
+use drivetrain::motor::{Actuator, AngleDrive, DriveProtocol, VelocityDrive};
 use drivetrain::vesc::*;
 
 pub fn call_all() {
@@ -36,10 +36,10 @@ fn motor() {
     Motor::decode_answer.call();
     Motor::wrong_setting.call();
     Motor::forget_settings.call();
-    Own::<Motor>::set_torque.call();
-    Own::<Motor>::motor_mut.call();
-    (|own: &mut Own<Motor>, target| own.set_velocity((), target)).call();
-    (|own: &mut Own<Motor>, target| own.set_angle((), target)).call();
-    family::<Own<Motor>>();
-    device::<Own<Motor>>();
+    Actuator::<Motor>::set_torque.call();
+    Actuator::<Motor>::motor_mut.call();
+    (|own: &mut Actuator<Motor>, target| own.set_velocity((), target)).call();
+    (|own: &mut Actuator<Motor>, target| own.set_angle((), target)).call();
+    family::<Actuator<Motor>>();
+    device::<Actuator<Motor>>();
 }

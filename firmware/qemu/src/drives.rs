@@ -1,4 +1,4 @@
-//! Eight own motors of each other family, as a program drives them: with our speed loop, by torque or current.
+//! Eight actuators of each other family, as a program drives them: with our speed loop, by torque or current.
 
 use crate::constant_time::UP_TIMES;
 use crate::meter::instructions;
@@ -9,7 +9,9 @@ use core::hint::black_box;
 use drivetrain::control::PidConfig;
 use drivetrain::encoder::GearRatio;
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{Devices, ImpedanceControl, Ingest, Own, OwnMotor, VelocityDrive};
+use drivetrain::motor::{
+    Actuator, Devices, DriveProtocol, ImpedanceControl, Ingest, VelocityDrive,
+};
 use drivetrain::sim::{
     self, DriveShaft, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive,
 };
@@ -92,7 +94,7 @@ impl Drive for Vesc {
 
 /// Eight driven motors, and the last frames of their drives.
 struct Group<M, D> {
-    motors: [Own<M>; MOTORS],
+    motors: [Actuator<M>; MOTORS],
     drives: [D; MOTORS],
     feedback: [Option<CanFrame>; MOTORS],
     /// The last frame of each drive that is no feedback.
@@ -100,9 +102,9 @@ struct Group<M, D> {
     now: Instant,
 }
 
-impl<M: OwnMotor + Debug, D: Drive> Group<M, D> {
+impl<M: DriveProtocol + Debug, D: Drive> Group<M, D> {
     fn new(motors: [M; MOTORS], drives: [D; MOTORS], now: Instant) -> Self {
-        let motors = motors.map(|motor| Own::new(motor).with_opening(Duration::ZERO));
+        let motors = motors.map(|motor| Actuator::new(motor).with_opening(Duration::ZERO));
         let (feedback, others) = ([None; MOTORS], [None; MOTORS]);
         let mut group = Self { motors, drives, feedback, others, now };
         for cycle in 0..1_200 {
@@ -148,7 +150,11 @@ impl<M: OwnMotor + Debug, D: Drive> Group<M, D> {
 
 /// The whole tick: feedback in, loops, commands out.
 #[inline(never)]
-fn whole<M: OwnMotor>(motors: &mut [Own<M>; MOTORS], feedback: &[CanFrame; MOTORS], tick: Tick) {
+fn whole<M: DriveProtocol>(
+    motors: &mut [Actuator<M>; MOTORS],
+    feedback: &[CanFrame; MOTORS],
+    tick: Tick,
+) {
     for frame in feedback {
         _ = motors.ingest(frame, tick.now());
     }
@@ -159,7 +165,11 @@ fn whole<M: OwnMotor>(motors: &mut [Own<M>; MOTORS], feedback: &[CanFrame; MOTOR
 }
 
 #[inline(never)]
-fn ingest<M: OwnMotor>(motors: &mut [Own<M>; MOTORS], feedback: &[CanFrame; MOTORS], now: Instant) {
+fn ingest<M: DriveProtocol>(
+    motors: &mut [Actuator<M>; MOTORS],
+    feedback: &[CanFrame; MOTORS],
+    now: Instant,
+) {
     for frame in feedback {
         _ = motors.ingest(frame, now);
     }
@@ -167,11 +177,11 @@ fn ingest<M: OwnMotor>(motors: &mut [Own<M>; MOTORS], feedback: &[CanFrame; MOTO
 
 /// Prints the tick, and a frame of the feedback: of other ids after each up-time, too. Commands do not arrive here, so the drives repeat
 /// their last frames; frames other than feedback come each 100 ms, and do not count.
-fn measure<M: OwnMotor + Debug, D: Drive>(
+fn measure<M: DriveProtocol + Debug, D: Drive>(
     names: [&str; 3],
     make: impl Fn([u8; MOTORS], Instant) -> Group<M, D>,
 ) {
-    let function = ingest as fn(&mut [Own<M>; MOTORS], &[CanFrame; MOTORS], Instant);
+    let function = ingest as fn(&mut [Actuator<M>; MOTORS], &[CanFrame; MOTORS], Instant);
     let mut frames = [0; UP_TIMES.len()];
     for (figure, (from, start)) in frames.iter_mut().zip((1..).zip(UP_TIMES)) {
         let Group { mut motors, feedback, now, .. } = make(ids(from), start);
@@ -181,7 +191,7 @@ fn measure<M: OwnMotor + Debug, D: Drive>(
     }
     let Group { mut motors, feedback, others, mut now, .. } = make(ids(1), START);
     let feedback = feedback.map(Option::unwrap);
-    let function = whole as fn(&mut [Own<M>; MOTORS], &[CanFrame; MOTORS], Tick);
+    let function = whole as fn(&mut [Actuator<M>; MOTORS], &[CanFrame; MOTORS], Tick);
     let figure = instructions(function, |whole, call| {
         now = now + Duration::from_millis(1);
         if call % 100 == 0 {

@@ -1,4 +1,4 @@
-//! Eight joints of Damiao in MIT mode, as a program drives them: each an own motor with our speed loop.
+//! Eight joints of Damiao in MIT mode, as a program drives them: each an actuator with our speed loop.
 
 use crate::constant_time::UP_TIMES;
 use crate::meter::instructions;
@@ -9,7 +9,7 @@ use drivetrain::control::{Pid, PidConfig};
 use drivetrain::damiao::{Model, Motor};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::Impedance;
-use drivetrain::motor::{Devices, ImpedanceControl, Ingest, Own, VelocityDrive};
+use drivetrain::motor::{Actuator, Devices, ImpedanceControl, Ingest, VelocityDrive};
 use drivetrain::sim::{DamiaoDrive, Drive};
 use drivetrain::time::{Duration, Instant, Tick, TimeStep};
 use drivetrain::units::AngularVelocity;
@@ -18,7 +18,7 @@ use embedded_can::{Frame, Id};
 
 const MOTORS: usize = 8;
 
-type Joints = [Own<Motor>; MOTORS];
+type Joints = [Actuator<Motor>; MOTORS];
 
 struct Arm {
     joints: Joints,
@@ -37,7 +37,7 @@ impl Arm {
         let mode = mode.unwrap();
         let joints = ids.map(|id| {
             let motor = Motor::new(Model::J4310, black_box(id), mode).unwrap();
-            Own::new(motor.with_master_id(master_id(id)).unwrap()).with_opening(Duration::ZERO)
+            Actuator::new(motor.with_master_id(master_id(id)).unwrap()).with_opening(Duration::ZERO)
         });
         let drives = ids
             .map(|id| DamiaoDrive::of(Model::J4310, id).with_register(7, f32::from(master_id(id))));

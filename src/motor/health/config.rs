@@ -123,24 +123,24 @@ impl HealthConfig {
     /// Outside, the motor is driven inward only, also if the shaft starts there; at speed, already a little before. No effect while the
     /// absolute position is unknown: for a geared motor, until the position is set. A motor without CAN refuses soft limits.
     ///
-    /// An [`Own`](super::Own) joint turns by the shortest way that stays inside, and to the next limit instead of an angle outside. An outward
+    /// An [`Actuator`](super::Actuator) turns by the shortest way that stays inside, and to the next limit instead of an angle outside. An outward
     /// velocity is at most the distance to the limit divided by 0.1 s. An outward torque falls to zero over the last 0.02 rad, and from half of
     /// that velocity up to it. A drive with [`Capability::AbsoluteAngle`](super::Capability::AbsoluteAngle) has its own zero where no
-    /// [other](super::Own::with_zero) is given; a drive without has no limits before
-    /// [`set_present_angle`](super::Own::set_present_angle).
+    /// [other](super::Actuator::with_zero) is given; a drive without has no limits before
+    /// [`set_present_angle`](super::Actuator::set_present_angle).
     ///
     /// # Examples
     /// ```
     /// use drivetrain::damiao::{Model, Motor};
     /// use drivetrain::frame::CanFrame;
-    /// use drivetrain::motor::{CanDevice, Condition, HealthConfig, ImpedanceControl, Own};
+    /// use drivetrain::motor::{CanDevice, Condition, HealthConfig, ImpedanceControl, Actuator};
     /// use drivetrain::time::{Instant, Tick};
     /// use drivetrain::units::Angle;
     ///
     /// static ELBOW: HealthConfig =
     ///     HealthConfig::new().with_soft_limits(Angle::from_radians(-0.5), Angle::from_radians(1.5));
     /// let motor = Motor::new(Model::J4310, 1, ImpedanceControl::new(3.0)?)?;
-    /// let mut elbow = Own::new(motor).with_health(&ELBOW)?;
+    /// let mut elbow = Actuator::new(motor).with_health(&ELBOW)?;
     /// let feedback = [0x11, 0x94, 0x7A, 0x7F, 0xF7, 0xFF, 30, 35]; // 2 rad of 12.5
     /// let feedback = CanFrame::standard(0x011, feedback).ok_or("id")?;
     /// for ms in 1..=2 {

@@ -4,7 +4,7 @@ use super::*;
 use crate::encoder::GearRatio;
 use crate::error::ConfigError;
 use crate::frame::CanFrame;
-use crate::motor::{Ingest, OwnMotor};
+use crate::motor::{DriveProtocol, Ingest};
 use crate::units::AngularVelocity;
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 

@@ -3,7 +3,7 @@
 use super::super::custom_motor::MyMotor;
 use super::*;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
-use drivetrain::motor::{CanDevice, Devices, Own, VelocityDrive};
+use drivetrain::motor::{Actuator, CanDevice, Devices, VelocityDrive};
 use drivetrain::units::{AngularVelocity, Current};
 use embedded_can::Frame;
 
@@ -66,11 +66,11 @@ impl<const RESUMES: bool> Subject<1> for Wheel<RESUMES> {
 }
 
 /// A bus and a motor of one's own, as one device.
-pub(crate) struct Both(Wheel<false>, Own<MyMotor>);
+pub(crate) struct Both(Wheel<false>, Actuator<MyMotor>);
 
 impl Both {
     pub(crate) fn new(setup: Setup) -> Self {
-        let own = Own::new(MyMotor::new(3).unwrap()).with_health(health(setup)).unwrap();
+        let own = Actuator::new(MyMotor::new(3).unwrap()).with_health(health(setup)).unwrap();
         Self(Wheel::new(setup), own.with_opening(setup.opening))
     }
 }
@@ -96,7 +96,7 @@ impl Subject<2> for Both {
         let [wheel] = self.0.is_armed();
         [wheel, self.1.guard().is_armed()]
     }
-    /// The own motor is asked for so much that its output is always at its limit.
+    /// The actuator is asked for so much that its output is always at its limit.
     fn set(&mut self, value: f32) -> [Result<(), TargetError>; 2] {
         let [wheel] = self.0.set(value);
         [wheel, self.1.set_velocity((), AngularVelocity::from_rpm(1_000.0 * value))]

@@ -6,17 +6,19 @@
 use super::*;
 use drivetrain::damiao;
 use drivetrain::encoder::GearRatio;
-use drivetrain::motor::{AngleDrive, CanDevice, Devices, ImpedanceControl, Own, OwnMotor};
+use drivetrain::motor::{
+    Actuator, AngleDrive, CanDevice, Devices, DriveProtocol, ImpedanceControl,
+};
 use drivetrain::robstride;
 use drivetrain::sim::{DamiaoDrive, Drive, RobStrideDrive};
 use drivetrain::units::{Angle, AngularVelocity};
 use drivetrain::vesc;
 use embedded_can::{ExtendedId, Frame};
 
-pub(super) type Set<M> = fn(&mut Own<M>, f32) -> Result<(), TargetError>;
+pub(super) type Set<M> = fn(&mut Actuator<M>, f32) -> Result<(), TargetError>;
 
-pub(super) fn own<M: OwnMotor>(motor: M, setup: Setup) -> Own<M> {
-    Own::new(motor).with_health(health(setup)).unwrap().with_opening(setup.opening)
+pub(super) fn own<M: DriveProtocol>(motor: M, setup: Setup) -> Actuator<M> {
+    Actuator::new(motor).with_health(health(setup)).unwrap().with_opening(setup.opening)
 }
 
 pub(super) const fn rules(follows: bool) -> [Rules; 1] {
@@ -55,7 +57,7 @@ fn none(_: &CanFrame) -> Option<f32> {
 
 /// The drive is asked for its settings, and enabled.
 pub(crate) struct Damiao<const FOLLOWS: bool> {
-    motor: Own<damiao::Motor>,
+    motor: Actuator<damiao::Motor>,
     drive: DamiaoDrive,
     output: Output,
     set: Set<damiao::Motor>,
@@ -139,7 +141,7 @@ impl<const FOLLOWS: bool> Subject<1> for Damiao<FOLLOWS> {
 }
 
 /// A wheel on a VESC that turns by torque, without a question for the fault code, which has a time of its own.
-pub(crate) struct Vesc(Own<vesc::Motor>);
+pub(crate) struct Vesc(Actuator<vesc::Motor>);
 
 impl Vesc {
     pub(crate) fn new(setup: Setup) -> Self {
@@ -186,7 +188,7 @@ impl Subject<1> for Vesc {
 
 /// The drive is asked for its settings, and enabled.
 pub(crate) struct RobStride {
-    motor: Own<robstride::Motor>,
+    motor: Actuator<robstride::Motor>,
     drive: RobStrideDrive,
     has_commanded: bool,
     /// The torque limit.

@@ -4,7 +4,7 @@ use super::drives::{Output, SPEED, Set, own, rules};
 use super::*;
 use drivetrain::lk;
 use drivetrain::motor::{
-    AngleDrive, CanDevice, Devices, ImpedanceControl, Own, OwnMotor, VelocityDrive,
+    Actuator, AngleDrive, CanDevice, Devices, DriveProtocol, ImpedanceControl, VelocityDrive,
 };
 use drivetrain::rmd;
 use drivetrain::sim::{self, Drive as _, LkDrive, RmdDrive};
@@ -51,7 +51,7 @@ impl Drive for RmdDrive {
 
 /// A motor of either family and its drive: their frames, and the answers to these, are alike.
 pub(crate) struct Alike<M, D, const FOLLOWS: bool> {
-    motor: Own<M>,
+    motor: Actuator<M>,
     drive: D,
     output: Output,
     has_commanded: bool,
@@ -64,15 +64,15 @@ pub(crate) type Lk<const FOLLOWS: bool> = Alike<lk::Motor, LkDrive, FOLLOWS>;
 /// The drive is asked for its state, confirms its time-out, and releases its brake or tells its angle.
 pub(crate) type Rmd<const FOLLOWS: bool> = Alike<rmd::Motor, RmdDrive, FOLLOWS>;
 
-fn torque<M: OwnMotor>(motor: &mut Own<M>, value: f32) -> Result<(), TargetError> {
+fn torque<M: DriveProtocol>(motor: &mut Actuator<M>, value: f32) -> Result<(), TargetError> {
     motor.set_torque(2.0 * value)
 }
 
-fn velocity<M: OwnMotor>(motor: &mut Own<M>, value: f32) -> Result<(), TargetError> {
+fn velocity<M: DriveProtocol>(motor: &mut Actuator<M>, value: f32) -> Result<(), TargetError> {
     motor.set_velocity((), AngularVelocity::from_rad_per_s(value))
 }
 
-fn angle<M: OwnMotor>(motor: &mut Own<M>, value: f32) -> Result<(), TargetError> {
+fn angle<M: DriveProtocol>(motor: &mut Actuator<M>, value: f32) -> Result<(), TargetError> {
     motor.set_angle((), Angle::from_radians(value))
 }
 
@@ -122,7 +122,7 @@ impl Rmd<true> {
     }
 }
 
-impl<M: OwnMotor, D: Drive, const FOLLOWS: bool> Alike<M, D, FOLLOWS> {
+impl<M: DriveProtocol, D: Drive, const FOLLOWS: bool> Alike<M, D, FOLLOWS> {
     fn new(motor: M, drive: D, set: Set<M>, setup: Setup) -> Self {
         let output = Output::new(hundredths);
         Self { motor: own(motor, setup), drive, output, has_commanded: false, set }
@@ -135,7 +135,7 @@ impl<M: OwnMotor, D: Drive, const FOLLOWS: bool> Alike<M, D, FOLLOWS> {
     }
 }
 
-impl<M: OwnMotor, D: Drive, const FOLLOWS: bool> Subject<1> for Alike<M, D, FOLLOWS> {
+impl<M: DriveProtocol, D: Drive, const FOLLOWS: bool> Subject<1> for Alike<M, D, FOLLOWS> {
     const RULES: [Rules; 1] = rules(FOLLOWS);
 
     own!(self => self.motor);

@@ -132,7 +132,7 @@ macro_rules! stops {
 }
 use stops;
 
-/// The calls of an own motor.
+/// The calls of an actuator.
 macro_rules! own {
     ($self:ident => $motor:expr) => {
         stops!($self => $motor);

@@ -2,14 +2,16 @@
 
 use super::drives::{Output, own, rules};
 use super::*;
-use drivetrain::motor::{AngleDrive, CanDevice, Devices, ImpedanceControl, Own, OwnMotor};
+use drivetrain::motor::{
+    Actuator, AngleDrive, CanDevice, Devices, DriveProtocol, ImpedanceControl,
+};
 use drivetrain::odrive::{Firmware, Heartbeat, Mode, Model, Motor};
 use drivetrain::sim::{Drive, OdriveDrive};
 use drivetrain::units::{Angle, AngularVelocity};
 use embedded_can::{Frame, StandardId};
 
 pub(crate) struct Odrive<const FOLLOWS: bool> {
-    motor: Own<Motor>,
+    motor: Actuator<Motor>,
     drive: OdriveDrive,
     output: Output,
     has_commanded: bool,

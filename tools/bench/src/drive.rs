@@ -5,7 +5,7 @@ use crate::own::{Kind, each};
 use drivetrain::control::{Pid, PidConfig};
 use drivetrain::encoder::GearRatio;
 use drivetrain::motor::{
-    CanDevice, Devices, Health, ImpedanceControl, Own, OwnMotor, TargetError, Visitor,
+    Actuator, CanDevice, Devices, DriveProtocol, Health, ImpedanceControl, TargetError, Visitor,
 };
 use drivetrain::time::TimeStep;
 use drivetrain::units::AngularVelocity;
@@ -240,15 +240,15 @@ fn kind(spec: Spec) -> Result<(Kind, f32), String> {
                 Some(master) => motor.with_master_id(master).map_err(text)?,
                 None => motor,
             };
-            (Kind::Damiao(Own::new(motor)), nm)
+            (Kind::Damiao(Actuator::new(motor)), nm)
         }
         Model::Lk(model) => {
             let nm = GENTLE * model.max_torque_nm();
-            (Kind::Lk(Own::new(lk::Motor::new(model, id, mode(nm)?).map_err(text)?)), nm)
+            (Kind::Lk(Actuator::new(lk::Motor::new(model, id, mode(nm)?).map_err(text)?)), nm)
         }
         Model::Rmd(model) => {
             let nm = GENTLE * model.max_torque_nm();
-            (Kind::Rmd(Own::new(rmd::Motor::new(model, id, mode(nm)?).map_err(text)?)), nm)
+            (Kind::Rmd(Actuator::new(rmd::Motor::new(model, id, mode(nm)?).map_err(text)?)), nm)
         }
         Model::RobStride(model) => {
             let nm = GENTLE * model.tmax_nm();
@@ -258,14 +258,14 @@ fn kind(spec: Spec) -> Result<(Kind, f32), String> {
                 Some(Err(_)) => return Err("a host id of RobStride is at most 255".into()),
                 None => motor,
             };
-            (Kind::RobStride(Own::new(motor)), nm)
+            (Kind::RobStride(Actuator::new(motor)), nm)
         }
         Model::Odrive(firmware) => {
             let nm = MOTOR_A * MOTOR_NM_PER_A;
             let model = odrive::Model::new("ODrive", ODRIVE_RPM_PER_V).map_err(text)?;
             let fastest = AngularVelocity::from_rpm(MOTOR_RPM);
             let motor = odrive::Motor::new(model, firmware, id, fastest, mode(nm)?);
-            (Kind::Odrive(Own::new(motor.map_err(text)?)), nm)
+            (Kind::Odrive(Actuator::new(motor.map_err(text)?)), nm)
         }
         Model::Vesc(pole_pairs) => {
             let model = vesc::Model {
@@ -277,7 +277,7 @@ fn kind(spec: Spec) -> Result<(Kind, f32), String> {
                 max_velocity: AngularVelocity::from_rpm(MOTOR_RPM),
             };
             let motor = vesc::Motor::new(model, id, vesc::Mode::current()).map_err(text)?;
-            (Kind::Vesc(Own::new(motor)), model.torque_limit_nm())
+            (Kind::Vesc(Actuator::new(motor)), model.torque_limit_nm())
         }
         Model::M3508 | Model::M2006 | Model::Gm6020 | Model::Gm6020Current => {
             return Err("a motor of DJI belongs to a bus".into());

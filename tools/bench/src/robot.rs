@@ -53,7 +53,7 @@ struct Dji {
 enum Place {
     Dji(Dji),
     /// By its place among those of other families.
-    Own(usize),
+    Actuator(usize),
 }
 
 /// Returns the facts of a model of DJI.
@@ -96,7 +96,7 @@ impl Robot {
                 Some(facts) => Place::Dji(robot.attach(*spec, facts, is_chassis)?),
                 None => {
                     robot.own.push(Drive::new(*spec)?);
-                    Place::Own(robot.own.len() - 1)
+                    Place::Actuator(robot.own.len() - 1)
                 }
             };
             let name = match &place {
@@ -105,7 +105,7 @@ impl Robot {
                     .motors()
                     .find(|(handle, _)| *handle == dji.handle)
                     .map(|(_, name)| name),
-                Place::Own(index) => robot.own.get(*index).map(|drive| drive.health().motor),
+                Place::Actuator(index) => robot.own.get(*index).map(|drive| drive.health().motor),
             };
             robot.places.push((name.ok_or("a motor without a name")?, place));
         }
@@ -160,7 +160,7 @@ impl Robot {
 
     fn drive(&self, motor: usize) -> Option<&Drive> {
         match self.place(motor)? {
-            Place::Own(index) => self.own.get(*index),
+            Place::Actuator(index) => self.own.get(*index),
             Place::Dji(_) => None,
         }
     }
@@ -168,7 +168,7 @@ impl Robot {
     /// The first motor, if it has registers.
     pub(crate) fn first_drive(&mut self) -> Option<&mut Drive> {
         match self.places.first()? {
-            (_, Place::Own(index)) => {
+            (_, Place::Actuator(index)) => {
                 self.own.get_mut(*index).filter(|drive| drive.has_registers())
             }
             (_, Place::Dji(_)) => None,
@@ -194,7 +194,7 @@ impl Robot {
         match self.place(motor)? {
             Place::Dji(_) if self.unit(motor) == "V" => None,
             Place::Dji(dji) => Some(dji.facts.torque_constant_nm_per_a),
-            Place::Own(_) => Some(1.0),
+            Place::Actuator(_) => Some(1.0),
         }
     }
 
@@ -241,7 +241,7 @@ impl Robot {
                 dji.speed = speed;
                 Ok(())
             }
-            Some((_, Place::Own(index))) => match self.own.get_mut(*index) {
+            Some((_, Place::Actuator(index))) => match self.own.get_mut(*index) {
                 Some(drive) => drive.set_gains(kp, ki, kd),
                 None => Ok(()),
             },
@@ -271,7 +271,7 @@ impl Robot {
                     self.bus.set_raw(dji.handle, word)
                 }
             },
-            Some((_, Place::Own(index))) => {
+            Some((_, Place::Actuator(index))) => {
                 let drive = self.own.get_mut(*index).ok_or(TargetError::Detached)?;
                 match target {
                     Target::Velocity(rad_per_s) => drive.set_velocity(rad_per_s, dt_s),
@@ -298,7 +298,7 @@ impl Robot {
                     health,
                 })
             }
-            Place::Own(_) => {
+            Place::Actuator(_) => {
                 let drive = self.drive(motor)?;
                 let health = drive.health();
                 Some(Reading {

@@ -39,7 +39,7 @@ enum Kind {
 #[derive(Debug)]
 enum Place {
     Dji(MotorKey),
-    Own(Box<Kind>),
+    Actuator(Box<Kind>),
 }
 
 #[derive(Debug)]
@@ -66,7 +66,9 @@ impl Simulated {
                 Some(config) => {
                     Place::Dji(world.attach(config).map_err(|error| error.to_string())?)
                 }
-                None => Place::Own(Box::new(kind(*spec).ok_or("a motor that is not simulated")?)),
+                None => {
+                    Place::Actuator(Box::new(kind(*spec).ok_or("a motor that is not simulated")?))
+                }
             };
             Ok(Motor { place, silent_until: Instant::START })
         });
@@ -79,7 +81,7 @@ impl Simulated {
         let now = self.world.now();
         let mut drives: Vec<(Line, &mut dyn Drive)> = Vec::new();
         for motor in &mut self.motors {
-            let Place::Own(kind) = &mut motor.place else { continue };
+            let Place::Actuator(kind) = &mut motor.place else { continue };
             if motor.silent_until <= now {
                 drives.push((BUS, kind.drive()));
             } else {
@@ -98,7 +100,7 @@ impl Simulated {
         match &motor.place {
             // Refused only if 16 faults last already.
             Place::Dji(key) => _ = self.world.fault(Fault::Silent(*key), now..until),
-            Place::Own(_) => motor.silent_until = until,
+            Place::Actuator(_) => motor.silent_until = until,
         }
     }
 
@@ -123,7 +125,7 @@ impl Simulated {
     pub(crate) fn is_at_rest(&self, motor: usize) -> bool {
         match &self.motors[motor].place {
             Place::Dji(key) => self.world.motor(*key).unwrap().command == 0,
-            Place::Own(kind) => kind.torque_nm() == 0.0,
+            Place::Actuator(kind) => kind.torque_nm() == 0.0,
         }
     }
 
@@ -132,7 +134,7 @@ impl Simulated {
     pub(crate) fn velocity(&self, motor: usize) -> f32 {
         match &self.motors[motor].place {
             Place::Dji(key) => self.world.motor(*key).unwrap().velocity.as_rad_per_s(),
-            Place::Own(kind) => kind.shaft().velocity_rad_per_s(),
+            Place::Actuator(kind) => kind.shaft().velocity_rad_per_s(),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The motor as a device of the runner.
 
-use super::{Offered, Own, OwnMotor, Target};
+use super::{Actuator, DriveProtocol, Offered, Target};
 use crate::frame::CanFrame;
 use crate::motor::{
     AngleDrive, CanDevice, Capabilities, Capability, Claim, Condition, Devices, Ingest, MotorName,
@@ -10,7 +10,7 @@ use crate::time::{Edge, Instant, Tick, TimeStep};
 use crate::units::{Angle, AngularVelocity};
 use embedded_can::Frame;
 
-impl<M: OwnMotor> CanDevice for Own<M> {
+impl<M: DriveProtocol> CanDevice for Actuator<M> {
     #[inline]
     fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
         if self.route.is_feedback(frame) {
@@ -155,7 +155,7 @@ impl<M: OwnMotor> CanDevice for Own<M> {
     }
 }
 
-impl<M: OwnMotor> Devices for Own<M> {
+impl<M: DriveProtocol> Devices for Actuator<M> {
     #[inline]
     fn visit(&mut self, visitor: &mut impl Visitor) {
         visitor.visit(self);
@@ -173,7 +173,7 @@ impl<M: OwnMotor> Devices for Own<M> {
 }
 
 /// There is one motor, so its handle is `()`.
-impl<M: OwnMotor> VelocityDrive<()> for Own<M> {
+impl<M: DriveProtocol> VelocityDrive<()> for Actuator<M> {
     fn velocity(&self, (): ()) -> Option<AngularVelocity> {
         self.is_online().then(|| self.motor.velocity() * self.joint.sign)
     }
@@ -187,7 +187,7 @@ impl<M: OwnMotor> VelocityDrive<()> for Own<M> {
     }
 }
 
-impl<M: OwnMotor> AngleDrive<()> for Own<M> {
+impl<M: DriveProtocol> AngleDrive<()> for Actuator<M> {
     fn angle(&self, (): ()) -> Option<Angle> {
         Some((self.measured_angle()? - self.joint.zero()?) * self.joint.sign)
     }

@@ -3,7 +3,7 @@
 #![cfg(test)]
 
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{Devices, Ingest, Own, VelocityDrive};
+use drivetrain::motor::{Actuator, Devices, Ingest, VelocityDrive};
 use drivetrain::time::{Instant, Tick};
 use drivetrain::units::AngularVelocity;
 use embedded_can::{Frame, StandardId};
@@ -15,7 +15,7 @@ use custom_motor::MyMotor;
 
 /// As in the example: 0.2 Nm for each ampere, 0.004 kg m² and friction at the output, a gear of 27.
 fn fastest_rpm(target_rpm: f32) -> f32 {
-    let mut motor = Own::new(MyMotor::new(3).unwrap());
+    let mut motor = Actuator::new(MyMotor::new(3).unwrap());
     let target = AngularVelocity::from_rpm(target_rpm);
     let (mut amperes, mut rad_per_s, mut fastest) = (0.0_f32, 0.0_f32, 0.0_f32);
     for ms in 1..=1_000 {

@@ -5,8 +5,8 @@
 
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    AngleDrive, ArmError, Capabilities, Capability, Claim, Condition, Ingest, Malformed, MotorName,
-    Order, Own, OwnMotor, Role, Target, TargetError, VelocityDrive,
+    Actuator, AngleDrive, ArmError, Capabilities, Capability, Claim, Condition, DriveProtocol,
+    Ingest, Malformed, MotorName, Order, Role, Target, TargetError, VelocityDrive,
 };
 use drivetrain::motor::{Devices, HealthConfig, Vitals};
 use drivetrain::time::{Duration, Instant, Tick};
@@ -56,7 +56,7 @@ impl Tool {
     const NO_TORQUE: Self = Self { disables: None, rest: (0x304, Some(0)), ..Self::POWERED };
 }
 
-impl OwnMotor for Tool {
+impl DriveProtocol for Tool {
     fn name(&self) -> MotorName {
         MotorName::new("tool", 1)
     }
@@ -141,7 +141,7 @@ enum Report {
 }
 
 struct Bench {
-    own: Own<Tool>,
+    own: Actuator<Tool>,
     ms: u64,
     report: Report,
     told: bool,
@@ -149,7 +149,7 @@ struct Bench {
 
 impl Bench {
     fn new(tool: Tool, report: Report) -> Self {
-        Self { own: Own::new(tool), ms: 1_000, report, told: false }
+        Self { own: Actuator::new(tool), ms: 1_000, report, told: false }
     }
 
     fn now(&self) -> Instant {
@@ -270,7 +270,7 @@ fn a_drive_is_disabled_at_the_start_also_where_it_is_armed_and_driven_before() {
 
 #[test]
 fn a_drive_is_disabled_by_a_stop_before_the_first_update() {
-    let stops: [fn(&mut Own<Tool>); 3] =
+    let stops: [fn(&mut Actuator<Tool>); 3] =
         [|own| own.disarm(), |own| own.trip(), |own| own.emergency_stop()];
     for stop in stops {
         let mut bench = Bench::new(Tool::POWERED, Report::None);
@@ -590,7 +590,7 @@ fn a_target_that_the_motor_does_not_offer_changes_nothing() {
     for offered in kinds {
         let tool = Tool { offers: Capabilities::of(&[offered]), ..Tool::PLAIN };
         let mut bench = Bench::armed(tool, Report::None);
-        let set = |own: &mut Own<Tool>, kind, value: f32| match kind {
+        let set = |own: &mut Actuator<Tool>, kind, value: f32| match kind {
             Capability::Torque => own.set_torque(value),
             Capability::Velocity => own.set_velocity((), AngularVelocity::from_rad_per_s(value)),
             _ => own.set_angle((), Angle::from_degrees(value)),
@@ -637,7 +637,7 @@ fn the_share_is_that_of_the_opening_or_that_of_the_heat() {
     static HEAT: HealthConfig = HealthConfig::new().with_temperatures(80, 100);
     let tool = Tool { temperature_c: 90, ..Tool::PLAIN };
     let mut bench = Bench::new(tool, Report::None);
-    bench.own = Own::new(tool).with_health(&HEAT).unwrap();
+    bench.own = Actuator::new(tool).with_health(&HEAT).unwrap();
     for _ in 0..20 {
         bench.idle();
     }
@@ -648,7 +648,7 @@ fn the_share_is_that_of_the_opening_or_that_of_the_heat() {
         assert!((bench.own.motor().share - expected).abs() < 0.006, "{ms}");
     }
     let mut at_once = Bench::new(Tool::PLAIN, Report::None);
-    at_once.own = Own::new(Tool::PLAIN).with_opening(Duration::ZERO);
+    at_once.own = Actuator::new(Tool::PLAIN).with_opening(Duration::ZERO);
     at_once.hear();
     at_once.arm();
     at_once.live();
@@ -690,7 +690,7 @@ fn a_second_master_is_named_by_the_command_that_it_sent() {
 /// A motor that answers with its state within the id, and takes commands with a number within it, as a CyberGear does.
 struct WideId;
 
-impl OwnMotor for WideId {
+impl DriveProtocol for WideId {
     fn name(&self) -> MotorName {
         MotorName::new("wide", 1)
     }
@@ -721,7 +721,7 @@ impl OwnMotor for WideId {
 
 #[test]
 fn an_id_may_carry_more_than_an_address() {
-    let mut own = Own::new(WideId);
+    let mut own = Actuator::new(WideId);
     let now = Instant::from_micros(1_000);
     let frame = |raw| CanFrame::of(ExtendedId::new(raw).unwrap(), []);
     assert_eq!(own.ingest(&frame(0x0280_02FD), now), Ingest::Unrelated);

@@ -1,14 +1,14 @@
 //! What a motor does with a frame of its drive, and in an update.
 
 use super::joint::{Inside, Reading, Start};
-use super::{INQUIRY, Offered, Order, Own, OwnMotor, SILENCE_US, Target};
+use super::{Actuator, DriveProtocol, INQUIRY, Offered, Order, SILENCE_US, Target};
 use crate::frame::CanFrame;
 use crate::motor::{Condition, Ingest, Link, Repeat, Role, Route, Vitals};
 use crate::time::{Instant, TimeStep};
 use embedded_can::Frame;
 
 /// Received frames: feedback, answers, and commands of another controller.
-impl<M: OwnMotor> Own<M> {
+impl<M: DriveProtocol> Actuator<M> {
     /// Takes a frame with an id of the feedback.
     pub(super) fn take(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
         if self.motor.decode_answer(frame) {
@@ -97,7 +97,7 @@ impl<M: OwnMotor> Own<M> {
     }
 }
 
-impl<M: OwnMotor> Own<M> {
+impl<M: DriveProtocol> Actuator<M> {
     /// Tells whether the drive is enabled, and no frame but a command is due: the case of almost each cycle of a driven motor.
     #[inline]
     pub(super) fn is_steady(&self) -> bool {

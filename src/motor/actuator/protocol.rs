@@ -1,4 +1,4 @@
-//! The part of a motor of your own with its ids, frames and loop.
+//! The protocol of a drive: its ids, its frames and its loop.
 
 use crate::control::PidConfig;
 use crate::error::ConfigError;
@@ -11,9 +11,9 @@ use crate::units::{Angle, AngularVelocity};
 use crate::wire::mit::Ranges;
 use crate::wire::mit::impedance::Impedance;
 
-/// A motor of your own: its ids, its frames and its loop.
+/// The protocol of a motor with its drive: ids, frames and loop. Each family has one; write one for a motor of your own.
 ///
-/// [`Own`](super::Own) makes a device of the motor, with everything in common to all motors. The example `custom_motor` is a
+/// [`Actuator`](super::Actuator) makes a device of the motor, with everything in common to all motors. The example `custom_motor` is a
 /// whole motor. The family [`damiao`](crate::damiao) has drives to be enabled and asked for settings first.
 ///
 /// # Examples
@@ -21,7 +21,7 @@ use crate::wire::mit::impedance::Impedance;
 /// use drivetrain::control::{Pid, PidConfig};
 /// use drivetrain::frame::CanFrame;
 /// use drivetrain::motor::{
-///     Claim, Devices, Ingest, Malformed, MotorName, Order, Own, OwnMotor, Role, Target, VelocityDrive,
+///     Claim, Devices, Ingest, Malformed, MotorName, Order, Actuator, DriveProtocol, Role, Target, VelocityDrive,
 /// };
 /// use drivetrain::time::{Duration, Instant, Tick};
 /// use drivetrain::units::AngularVelocity;
@@ -31,7 +31,7 @@ use crate::wire::mit::impedance::Impedance;
 ///
 /// fn id(raw: u16) -> Id { StandardId::new(raw).unwrap_or(StandardId::ZERO).into() }
 ///
-/// impl OwnMotor for Mine {
+/// impl DriveProtocol for Mine {
 ///     fn name(&self) -> MotorName { MotorName::new("mine", 1) }
 ///     fn claims(&self) -> impl IntoIterator<Item = Claim> {
 ///         let claim = |raw, role| Claim::new(id(raw), role, self.name());
@@ -58,7 +58,7 @@ use crate::wire::mit::impedance::Impedance;
 /// }
 ///
 /// let mine = Mine { rpm: 0, speed: Pid::new(PidConfig::new(2.0, 0.0, 0.0))? };
-/// let mut motor = Own::new(mine).with_opening(Duration::ZERO); // all of the output at once
+/// let mut motor = Actuator::new(mine).with_opening(Duration::ZERO); // all of the output at once
 /// let now = Instant::from_micros(1_000);
 /// let feedback = CanFrame::of(id(0x124), [0, 50]); // 50 rpm
 /// assert_eq!(motor.ingest(&feedback, now), Ingest::Taken);
@@ -69,7 +69,7 @@ use crate::wire::mit::impedance::Impedance;
 /// assert_eq!(format!("{frame:?}"), "123 [2] 00 C8"); // 2 * (150 - 50)
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub trait OwnMotor {
+pub trait DriveProtocol {
     /// Returns how the motor is called in errors.
     fn name(&self) -> MotorName;
 
@@ -99,7 +99,7 @@ pub trait OwnMotor {
     /// rests when disabled: return the disabling frame here, and `None` from [`disable`](Self::disable).
     ///
     /// A remote frame, a question for feedback, may take its turn between frames of rest. If no rest was sent before,
-    /// [`Own`](super::Own) leaves the question out and calls this again.
+    /// [`Actuator`](super::Actuator) leaves the question out and calls this again.
     fn rest(&mut self) -> CanFrame;
 
     /// Runs the loop for one step and returns the command: a data frame of up to 8 bytes with an id of its commands.
@@ -111,7 +111,7 @@ pub trait OwnMotor {
     fn reset(&mut self);
 
     /// Changes the loops that this crate runs, from rad to rad/s and from rad/s to Nm, also while the motor is driven: see
-    /// [`Own::set_loops`](super::Own::set_loops).
+    /// [`Actuator::set_loops`](super::Actuator::set_loops).
     ///
     /// # Errors
     /// Names the parameter without a sensible value; [`ConfigError::Unsupported`], unless said otherwise, for a motor without such loops.
@@ -123,7 +123,7 @@ pub trait OwnMotor {
 
     /// Returns the next frame to enable the drive; `None`, the default, for a drive without such frames.
     ///
-    /// [`Own`](super::Own) calls this when the motor may be driven and was not before. If [`is_enabled`](Self::is_enabled)
+    /// [`Actuator`](super::Actuator) calls this when the motor may be driven and was not before. If [`is_enabled`](Self::is_enabled)
     /// reports, the call is repeated each 10 ms until the drive is enabled. Until then the drive gets [`rest`](Self::rest)
     /// only, or [`poll`](Self::poll) if `rest` would disable the drive. The output [opens](Order::share) from zero afterwards.
     ///
@@ -138,7 +138,7 @@ pub trait OwnMotor {
     /// Returns the next frame to disable the drive; `None`, the default, for a drive without such frames, or if
     /// [`rest`](Self::rest) disables.
     ///
-    /// [`Own`](super::Own) calls this at the start, on disarm, trip and emergency stop, and when the motor has no target. The
+    /// [`Actuator`](super::Actuator) calls this at the start, on disarm, trip and emergency stop, and when the motor has no target. The
     /// call is repeated each 100 ms, or each 10 ms while the drive reports the state "enabled".
     fn disable(&mut self) -> Option<CanFrame> {
         None
@@ -153,7 +153,7 @@ pub trait OwnMotor {
     /// Takes back a frame of this motor: refused or given back by the driver, or replaced by a newer frame. Nothing
     /// is done unless said otherwise.
     ///
-    /// [`Own`](super::Own) calls this before asking for the next frame of the same kind. Commands and frames of rest come again
+    /// [`Actuator`](super::Actuator) calls this before asking for the next frame of the same kind. Commands and frames of rest come again
     /// anyway; a motor with frames only now and then, or frames in an order, takes the turn back here.
     fn unsent(&mut self, frame: &CanFrame) {
         _ = frame;
@@ -167,7 +167,7 @@ pub trait OwnMotor {
     /// Returns the next frame to read or write a setting of the drive; `None`, the default, for a
     /// drive without settings.
     ///
-    /// [`Own`](super::Own) calls this each 10 ms while the drive is disabled, in the place of a frame of [rest](Self::rest) between
+    /// [`Actuator`](super::Actuator) calls this each 10 ms while the drive is disabled, in the place of a frame of [rest](Self::rest) between
     /// two others, so a setting is read before each arming of the motor. The answer comes to [`decode_answer`](Self::decode_answer).
     fn inquire(&mut self) -> Option<CanFrame> {
         None
@@ -190,7 +190,7 @@ pub trait OwnMotor {
     /// or be another drive.
     fn forget_settings(&mut self) {}
 
-    /// Returns the number of frames to the drive for one answer, for the largest [load](super::Own::load) of the bus: 1, the default, if
+    /// Returns the number of frames to the drive for one answer, for the largest [load](super::Actuator::load) of the bus: 1, the default, if
     /// the drive answers each frame; 2 if the drive answers questions alone, since a question stands between two other frames; 0 for no
     /// answers.
     fn frames_per_answer(&self) -> u32 {
@@ -245,7 +245,7 @@ impl Target {
     }
 }
 
-/// A target with its limits, for one step: see [`OwnMotor::control`](super::OwnMotor::control).
+/// A target with its limits, for one step: see [`DriveProtocol::control`](super::DriveProtocol::control).
 ///
 /// Destructure it, `let Order { target, share, step } = order;`: the compiler then warns if a field is not used.
 #[derive(Debug, Clone, Copy, PartialEq)]

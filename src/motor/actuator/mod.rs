@@ -1,11 +1,11 @@
-//! A motor of your own as a device.
+//! An actuator: one motor with its drive, as a device.
 
 mod device;
 mod impedance;
 mod joint;
 mod mode;
-mod motor;
 mod power;
+mod protocol;
 mod registers;
 mod settings;
 mod update;
@@ -13,10 +13,10 @@ mod update;
 pub use crate::wire::mit::impedance::Impedance;
 pub use impedance::ImpedanceControl;
 pub(crate) use impedance::{Shaft, TorqueLoops};
-pub use motor::{Order, OwnMotor, Target};
+pub use protocol::{DriveProtocol, Order, Target};
 
 pub(crate) use mode::{ControlMode, Goal, Questions, Told, inside};
-pub(crate) use motor::ingest_eight;
+pub(crate) use protocol::ingest_eight;
 pub(crate) use registers::{
     Form, code_from, lowest_bit, mit_model, models, register_questions, registers,
 };
@@ -41,14 +41,14 @@ const SILENCE_US: u32 = 100_000;
 /// The time between two questions for a setting.
 const INQUIRY: Duration = Duration::from_millis(10);
 
-/// A motor of your own as a device of the runner, beside all others.
+/// One motor with its drive as a device of the runner, beside all others: of a family of this crate, or of your own.
 ///
 /// Disarmed at start. Late and lost feedback, an old target, a target that is not finite, a second bad time step, a clock that
-/// does not move on and an emergency stop send the [frame of rest](OwnMotor::rest) in the same cycle: [`Guard`] has the rules.
+/// does not move on and an emergency stop send the [frame of rest](DriveProtocol::rest) in the same cycle: [`Guard`] has the rules.
 /// Each update offers a command or the frame of rest. If the drive is to be enabled or disabled, the frame for that comes first.
-/// [`OwnMotor`] has an example.
+/// [`DriveProtocol`] has an example.
 #[derive(Debug, Clone, Copy)]
-pub struct Own<M> {
+pub struct Actuator<M> {
     motor: M,
     joint: Joint,
     route: Route,
@@ -80,7 +80,7 @@ pub struct Own<M> {
     rival: Option<Claim>,
 }
 
-impl<M: OwnMotor> Own<M> {
+impl<M: DriveProtocol> Actuator<M> {
     /// Takes the motor: disarmed.
     #[must_use]
     pub const fn new(motor: M) -> Self {
@@ -108,7 +108,7 @@ impl<M: OwnMotor> Own<M> {
         }
     }
 
-    /// Sets the checks of health and their reactions, as far as the motor's [`vitals`](OwnMotor::vitals) tell.
+    /// Sets the checks of health and their reactions, as far as the motor's [`vitals`](DriveProtocol::vitals) tell.
     ///
     /// # Errors
     /// Names the parameter without a sensible value.
@@ -173,11 +173,11 @@ impl<M: OwnMotor> Own<M> {
     /// ```
     /// use drivetrain::damiao::{Model, Motor};
     /// use drivetrain::frame::CanFrame;
-    /// use drivetrain::motor::{AngleDrive, CanDevice, ImpedanceControl, Ingest, Own};
+    /// use drivetrain::motor::{AngleDrive, CanDevice, ImpedanceControl, Ingest, Actuator};
     /// use drivetrain::time::Instant;
     /// use drivetrain::units::Angle;
     ///
-    /// let mut knee = Own::new(Motor::new(Model::J4310, 1, ImpedanceControl::new(3.0)?)?).reversed();
+    /// let mut knee = Actuator::new(Motor::new(Model::J4310, 1, ImpedanceControl::new(3.0)?)?).reversed();
     /// let feedback = [0x11, 0x94, 0x7A, 0x7F, 0xF7, 0xFF, 30, 35]; // 2 rad of 12.5
     /// let feedback = CanFrame::standard(0x011, feedback).ok_or("id")?;
     /// assert_eq!(knee.ingest(&feedback, Instant::from_micros(1_000)), Ingest::Taken);
@@ -210,7 +210,7 @@ impl<M: OwnMotor> Own<M> {
     /// after [`Pid::set_gains`](crate::control::Pid::set_gains), so a larger gain of the position asks for more velocity at once.
     ///
     /// # Errors
-    /// As [`OwnMotor::set_loops`].
+    /// As [`DriveProtocol::set_loops`].
     pub fn set_loops(&mut self, position: PidConfig, speed: PidConfig) -> Result<(), ConfigError> {
         self.motor.set_loops(position, speed)
     }
@@ -244,9 +244,9 @@ impl<M: OwnMotor> Own<M> {
     /// Four drives with answers do not fit a bus of 1 Mbit/s at 1 kHz, and do at 500 Hz:
     /// ```
     /// use drivetrain::damiao::{Model, Motor};
-    /// use drivetrain::motor::{BusLoad, ImpedanceControl, Own};
+    /// use drivetrain::motor::{BusLoad, ImpedanceControl, Actuator};
     ///
-    /// let joint = |id| Motor::new(Model::J4310, id, ImpedanceControl::new(3.0)?).map(Own::new);
+    /// let joint = |id| Motor::new(Model::J4310, id, ImpedanceControl::new(3.0)?).map(Actuator::new);
     /// let joints = [joint(1)?, joint(2)?, joint(3)?, joint(4)?];
     /// let load = |hz| joints.iter().fold(BusLoad::new(1_000_000), |sum, joint| sum.and(&joint.load(1_000_000, hz)));
     /// assert_eq!(load(1_000).to_string(), "98 % to 119 %");

@@ -1,4 +1,4 @@
-//! Whether the drive of an own motor is enabled.
+//! Whether the drive of an actuator is enabled.
 
 use crate::time::{Duration, Instant};
 

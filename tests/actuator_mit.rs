@@ -5,8 +5,8 @@
 
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    AngleDrive, Capabilities, Claim, Devices, Ingest, MotorName, Order, Own, OwnMotor, TargetError,
-    VelocityDrive, Vitals,
+    Actuator, AngleDrive, Capabilities, Claim, Devices, DriveProtocol, Ingest, MotorName, Order,
+    TargetError, VelocityDrive, Vitals,
 };
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
@@ -80,7 +80,7 @@ impl Read {
 }
 
 /// A motor #1 in MIT mode.
-trait Mit: OwnMotor {
+trait Mit: DriveProtocol {
     fn make() -> Self;
 }
 
@@ -99,7 +99,7 @@ impl Mit for EightZeros {
     }
 }
 
-impl OwnMotor for EightZeros {
+impl DriveProtocol for EightZeros {
     fn name(&self) -> MotorName {
         self.0.name()
     }
@@ -141,8 +141,8 @@ impl OwnMotor for EightZeros {
     }
 }
 
-fn own(number: u8) -> Own<J4310> {
-    Own::new(J4310::new(number, MASTER_ID).unwrap())
+fn own(number: u8) -> Actuator<J4310> {
+    Actuator::new(J4310::new(number, MASTER_ID).unwrap())
 }
 
 fn id(raw: u16) -> StandardId {
@@ -170,7 +170,7 @@ const KINDS: [Kind; 3] = [Kind::Torque, Kind::Velocity, Kind::Angle];
 
 /// A motor, its drive, and a clock.
 struct Bench<M> {
-    own: Own<M>,
+    own: Actuator<M>,
     micros: u64,
     /// What the drive follows.
     is_enabled: bool,
@@ -178,7 +178,7 @@ struct Bench<M> {
 
 impl<M: Mit> Bench<M> {
     fn new() -> Self {
-        Self { own: Own::new(M::make()), micros: 1_000_000, is_enabled: false }
+        Self { own: Actuator::new(M::make()), micros: 1_000_000, is_enabled: false }
     }
 
     fn now(&self) -> Instant {
@@ -609,7 +609,7 @@ fn an_id_that_an_answer_has_no_room_for_is_refused_and_so_is_one_id_for_command_
     for number in [0, 16, 0x15, 255] {
         assert!(J4310::new(number, MASTER_ID).is_none(), "{number}");
     }
-    let refused = Own::new(J4310::new(5, 5).unwrap()).arm(Instant::START).unwrap_err();
+    let refused = Actuator::new(J4310::new(5, 5).unwrap()).arm(Instant::START).unwrap_err();
     assert_eq!(
         refused.to_string(),
         "command of DM-J4310 #5 on 0x5 clashes with feedback of DM-J4310 #5 on 0x5"

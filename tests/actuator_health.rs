@@ -4,8 +4,8 @@
 
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    ArmError, Claim, Condition, Devices, HealthConfig, Ingest, Malformed, MotorName, Order, Own,
-    OwnMotor, Reaction, Role, TargetError, VelocityDrive, Vitals,
+    Actuator, ArmError, Claim, Condition, Devices, DriveProtocol, HealthConfig, Ingest, Malformed,
+    MotorName, Order, Reaction, Role, TargetError, VelocityDrive, Vitals,
 };
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::AngularVelocity;
@@ -27,7 +27,7 @@ fn id(raw: u16) -> Id {
     StandardId::new(raw).unwrap().into()
 }
 
-impl OwnMotor for Talker {
+impl DriveProtocol for Talker {
     fn name(&self) -> MotorName {
         MotorName::new("talker", 1)
     }
@@ -68,14 +68,14 @@ impl OwnMotor for Talker {
 }
 
 struct Bench {
-    own: Own<Talker>,
+    own: Actuator<Talker>,
     ms: u64,
 }
 
 impl Bench {
     fn new(config: &'static HealthConfig) -> Self {
         let talker = Talker { share: 1.0, ..Talker::default() };
-        let own = Own::new(talker).with_health(config).unwrap().with_opening(Duration::ZERO);
+        let own = Actuator::new(talker).with_health(config).unwrap().with_opening(Duration::ZERO);
         let mut bench = Self { own, ms: 0 };
         bench.step([30, 0, 0, 0]);
         bench.own.arm(bench.now()).unwrap();
@@ -230,7 +230,7 @@ proptest! {
             .with_stall_hold(hold);
         let talker = Talker::default();
         let told = Rc::clone(&talker.instead);
-        let own = Own::new(talker).with_opening(Duration::from_micros(opening_us));
+        let own = Actuator::new(talker).with_opening(Duration::from_micros(opening_us));
         // One that makes no sense is refused, and that of the start is left.
         let mut own = match own.with_health(Box::leak(Box::new(config))) {
             Ok(own) => own,

@@ -5,8 +5,8 @@
 
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    AngleDrive, Capabilities, Capability, Claim, Condition, Devices, HealthConfig, Ingest,
-    Malformed, MotorName, Order, Own, OwnMotor, Role, Target, TargetError, Timeouts,
+    Actuator, AngleDrive, Capabilities, Capability, Claim, Condition, Devices, DriveProtocol,
+    HealthConfig, Ingest, Malformed, MotorName, Order, Role, Target, TargetError, Timeouts,
 };
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
@@ -25,7 +25,7 @@ fn id(raw: u16) -> StandardId {
     StandardId::new(raw).unwrap()
 }
 
-impl OwnMotor for Plain {
+impl DriveProtocol for Plain {
     fn name(&self) -> MotorName {
         MotorName::new("plain", 1)
     }
@@ -73,13 +73,13 @@ fn at_ms(ms: u64) -> Instant {
     Instant::from_micros(1_000 * ms)
 }
 
-struct Bench(Own<Plain>);
+struct Bench(Actuator<Plain>);
 
 impl Bench {
     /// A joint at a zero of its own, armed and led there.
     fn new(is_absolute: bool, angle: f32) -> Self {
         let drive = Plain { angle, velocity: 0.0, is_absolute };
-        let mut bench = Self(Own::new(drive).with_opening(Duration::ZERO));
+        let mut bench = Self(Actuator::new(drive).with_opening(Duration::ZERO));
         bench.hear(1, angle, 0.0);
         bench.0.set_present_angle(Angle::ZERO).unwrap();
         bench.update(1, 0.001);
@@ -199,7 +199,7 @@ static WIDE: HealthConfig =
 /// A joint with soft limits wider than a turn, whose drive counts so far.
 fn limited(is_absolute: bool, angle: f32) -> Bench {
     let drive = Plain { angle, velocity: 0.0, is_absolute };
-    let own = Own::new(drive).with_opening(Duration::ZERO).with_health(&WIDE).unwrap();
+    let own = Actuator::new(drive).with_opening(Duration::ZERO).with_health(&WIDE).unwrap();
     let mut bench = Bench(own);
     bench.hear(1, angle, 0.0);
     bench.update(1, 0.001);
