@@ -126,7 +126,6 @@ impl<C: embedded_can::blocking::Can> Driver for BlockingTx<C> {
 /// use drivetrain::dji::{Bus, Config, M3508};
 /// use drivetrain::frame::CanFrame;
 /// use drivetrain::runner::{AbortPending, Nb, NbAbort, Runner};
-/// use core::cell::Cell;
 /// use drivetrain::time::{Duration, Instant};
 /// # use embedded_can::ErrorKind;
 ///
@@ -149,7 +148,7 @@ impl<C: embedded_can::blocking::Can> Driver for BlockingTx<C> {
 ///     }
 /// }
 ///
-/// let clock = Cell::new(Instant::START);
+/// let clock = core::cell::Cell::new(Instant::START);
 /// let mut bus = Bus::new();
 /// bus.attach(Config::<M3508>::new(1))?;
 /// let mut runner = Runner::new(NbAbort(Nb(Unplugged::default())), &clock, bus);
