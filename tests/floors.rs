@@ -417,7 +417,7 @@ const RULES: [&str; 14] = [
 
 /// Durations that a family compares with a limit: of the frames of its drives, none of a link or a target. File, words, reason.
 const TIMES_OF_DRIVES: [(&str, &str, &str); 6] = [
-    ("pwm/rc.rs", "arming_time", "an ESC wants neutral for so long before it follows"),
+    ("pwm/rc.rs", "self . arming_time", "an ESC wants neutral for so long before it follows"),
     ("snake/slot.rs", "KEEP_RELAXED", "a disable is sent again: a drive may have missed it"),
     ("snake/slot/health.rs", "window", "a joint that does not move, as its configuration says"),
     ("motor/actuator/power.rs", "SETTLING", "a drive may report its former state for so long"),

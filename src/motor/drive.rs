@@ -5,6 +5,7 @@ use crate::encoder::Position;
 use crate::time::Instant;
 use crate::units::{Angle, AngularVelocity};
 use core::convert::Infallible;
+use core::fmt::{self, Debug};
 
 /// An owner of motors whose output shafts follow a velocity.
 ///
@@ -138,6 +139,19 @@ pub enum OneOf<A, B, C = Infallible, D = Infallible> {
     /// A motor of the fourth owner.
     Fourth(D),
 }
+
+impl<A: Debug, B: Debug, C: Debug, D: Debug> fmt::Display for OneOf<A, B, C, D> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::First(of) => write!(f, "first: {of:?}"),
+            Self::Second(of) => write!(f, "second: {of:?}"),
+            Self::Third(of) => write!(f, "third: {of:?}"),
+            Self::Fourth(of) => write!(f, "fourth: {of:?}"),
+        }
+    }
+}
+
+impl<A: Debug, B: Debug, C: Debug, D: Debug> core::error::Error for OneOf<A, B, C, D> {}
 
 macro_rules! tuple {
     ($handles:ty: $($owner:ident $handle:ident $index:tt $place:ident),+) => {

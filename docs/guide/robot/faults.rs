@@ -31,7 +31,7 @@ fn without_the_plug_of_the_wheels_the_base_rests_until_the_switch_turns_on_again
 
     run(&world, &mut robot, 200, OFF);
     run(&world, &mut robot, 1_500, WISH);
-    let speed = world.chassis().unwrap().twist.vx_m_s;
+    let speed = world.chassis().unwrap().1.vx_m_s;
     assert!((speed - 0.5).abs() < 0.03, "{speed} m/s");
 }
 
@@ -49,13 +49,13 @@ fn a_silent_wheel_is_late_after_10_ms_and_lost_after_100() {
     let edges: Vec<_> =
         edges.map(|edge| (edge.condition, edge.at.since(ms(1_000)).as_micros() / 1_000)).collect();
     assert_eq!(edges[..2], [(Condition::Late, 10), (Condition::Offline, 100)]);
-    let speed = world.chassis().unwrap().twist.linear().norm();
+    let speed = world.chassis().unwrap().1.linear().norm();
     assert!(speed < 0.02, "{speed} m/s"); // the rear wheel does not turn in this motion: the front wheels brake
 }
 
 /// Loses a wheel at 0.5 m/s. Returns from then on: the time in s until 0.01 m/s, the way in m forward and to the left, the turn in
 /// degrees.
-fn stop_without(wheel: usize, wish_when_lost: Wish) -> [f64; 4] {
+fn stop_without(wheel: usize, wish_when_lost: Wish) -> [f32; 4] {
     static STOP: EmergencyStop = EmergencyStop::new();
     let world = Simulation::new(1);
     let (wheels, _) = motors(&world);
@@ -63,24 +63,24 @@ fn stop_without(wheel: usize, wish_when_lost: Wish) -> [f64; 4] {
     let mut robot = robot(&world, &STOP);
     run(&world, &mut robot, 100, OFF);
     run(&world, &mut robot, 900, WISH);
-    let start = world.chassis().unwrap();
+    let (start, _) = world.chassis().unwrap();
     run(&world, &mut robot, 101, WISH);
     assert!(!robot.lower.is_armed() && robot.upper.is_armed());
     let mut moved_s = 0.0;
-    for ms in 102..=4_000 {
+    for ms in 102..=4_000_u16 {
         run(&world, &mut robot, 1, wish_when_lost);
-        if world.chassis().unwrap().twist.linear().norm() > 0.01 {
-            moved_s = f64::from(ms) / 1_000.0;
+        if world.chassis().unwrap().1.linear().norm() > 0.01 {
+            moved_s = f32::from(ms) / 1_000.0;
         }
     }
-    let end = world.chassis().unwrap();
-    let turn = (end.heading_rad - start.heading_rad).to_degrees();
+    let (end, _) = world.chassis().unwrap();
+    let turn = (end.angle - start.angle).as_degrees();
     [moved_s, end.x_m - start.x_m, end.y_m - start.y_m, turn]
 }
 
 #[test]
 fn without_a_front_wheel_the_robot_turns_if_the_others_brake_and_rolls_on_if_all_are_disarmed() {
-    let is_near = |stop: [f64; 4], expected: [f64; 4]| {
+    let is_near = |stop: [f32; 4], expected: [f32; 4]| {
         let far = [0, 1, 2, 3].map(|i| (stop[i] - expected[i]).abs());
         assert!(far[0] < 0.1 && far[1] < 0.01 && far[2] < 0.01 && far[3] < 1.0, "{stop:?}");
     };

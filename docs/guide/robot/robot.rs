@@ -139,7 +139,7 @@ pub mod tests {
         run(&world, &mut robot, 100, Wish { is_on: Some(false), ..WISH });
         run(&world, &mut robot, 1_500, Wish { order: ShooterOrder::Spin, ..WISH });
         run(&world, &mut robot, 1_500, Wish { order: ShooterOrder::Fire(3), ..WISH });
-        let speed = world.chassis().unwrap().twist.vx_m_s;
+        let speed = world.chassis().unwrap().1.vx_m_s;
         let degrees = world.motor(turret[0]).unwrap().position.angle().as_degrees();
         assert!((speed - 0.5).abs() < 0.03, "{speed} m/s");
         assert!((degrees - 90.0).abs() < 1.0, "{degrees}");
