@@ -8,7 +8,7 @@ mod console;
 use drivetrain::control::{Pid, PidConfig};
 use drivetrain::dji::{Bus, Config, M3508};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{Actuator, Claim, DriveProtocol, Ingest, Malformed, MotorName, Order};
+use drivetrain::motor::{Actuator, Claim, DriveProtocol, Ingest, MotorName, Order};
 use drivetrain::motor::{Role, Target, Vitals};
 use drivetrain::units::AngularVelocity;
 use embedded_can::{Frame, Id, StandardId};
@@ -51,7 +51,7 @@ impl DriveProtocol for MyMotor {
 
     fn decode(&mut self, frame: &CanFrame) -> Ingest {
         let [low, high, temperature_c] = *frame.data() else {
-            return Ingest::Malformed(Malformed::Length(frame.length()));
+            return Ingest::WrongLength(frame.length());
         };
         (self.rotor_rpm, self.temperature_c) = (i16::from_le_bytes([low, high]), temperature_c);
         Ingest::Taken

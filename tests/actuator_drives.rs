@@ -6,7 +6,7 @@
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
     Actuator, AngleDrive, ArmError, Capabilities, Capability, Claim, Condition, DriveProtocol,
-    Ingest, Malformed, MotorName, Order, Role, Target, TargetError, VelocityDrive,
+    Ingest, MotorName, Order, Role, Target, TargetError, VelocityDrive,
 };
 use drivetrain::motor::{Devices, HealthConfig, Vitals};
 use drivetrain::time::{Duration, Instant, Tick};
@@ -77,8 +77,8 @@ impl DriveProtocol for Tool {
                 Ingest::Taken
             }
             (false, [7]) => Ingest::Unrelated,
-            (false, [_]) => Ingest::Malformed(Malformed::Field),
-            _ => Ingest::Malformed(Malformed::Length(frame.length())),
+            (false, [_]) => Ingest::WrongField,
+            _ => Ingest::WrongLength(frame.length()),
         }
     }
     fn velocity(&self) -> AngularVelocity {
@@ -664,8 +664,8 @@ fn frames_of_several_ids_are_taken_handed_on_or_refused() {
     assert_eq!(ingest(0x381, &[0]), Ingest::Taken);
     assert_eq!(ingest(0x382, &[1]), Ingest::Taken);
     assert_eq!(ingest(0x382, &[7]), Ingest::Unrelated);
-    assert_eq!(ingest(0x382, &[9]), Ingest::Malformed(Malformed::Field));
-    assert_eq!(ingest(0x381, &[]), Ingest::Malformed(Malformed::Length(0)));
+    assert_eq!(ingest(0x382, &[9]), Ingest::WrongField);
+    assert_eq!(ingest(0x381, &[]), Ingest::WrongLength(0));
     assert_eq!(ingest(0x383, &[0]), Ingest::Unrelated);
     let remote = CanFrame::new_remote(id(0x381), 1).unwrap();
     assert_eq!(bench.own.ingest(&remote, now), Ingest::Unrelated);

@@ -4,8 +4,8 @@
 
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    Actuator, ArmError, Claim, Condition, Devices, DriveProtocol, HealthConfig, Ingest, Malformed,
-    MotorName, Order, Reaction, Role, TargetError, VelocityDrive, Vitals,
+    Actuator, ArmError, Claim, Condition, Devices, DriveProtocol, HealthConfig, Ingest, MotorName,
+    Order, Reaction, Role, TargetError, VelocityDrive, Vitals,
 };
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::AngularVelocity;
@@ -37,7 +37,7 @@ impl DriveProtocol for Talker {
     }
     fn decode(&mut self, frame: &CanFrame) -> Ingest {
         let [celsius, code, effort, speed] = *frame.data() else {
-            return Ingest::Malformed(Malformed::Length(frame.length()));
+            return Ingest::WrongLength(frame.length());
         };
         self.vitals = Vitals {
             temperature_c: Some(celsius.into()),

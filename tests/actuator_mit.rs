@@ -336,9 +336,9 @@ impl Cause {
                         let other = CanFrame::of(id(MASTER_ID), [0x12, a, b, c, d, e, f, g]);
                         assert_eq!(bench.own.ingest(&other, now), Ingest::Unrelated);
                         let short = CanFrame::of(id(MASTER_ID), [0x11, a, b, c, d, e, f]);
-                        assert!(matches!(bench.own.ingest(&short, now), Ingest::Malformed(_)));
+                        assert!(bench.own.ingest(&short, now).is_malformed());
                         let odd = CanFrame::of(id(MASTER_ID), [0x21, a, b, c, d, e, f, g]);
-                        assert!(matches!(bench.own.ingest(&odd, now), Ingest::Malformed(_)));
+                        assert!(bench.own.ingest(&odd, now).is_malformed());
                     }
                     _ = bench.set(kind, 1.0);
                     let frames = bench.update(0.001);

@@ -6,7 +6,7 @@
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
     Actuator, AngleDrive, Capabilities, Capability, Claim, Condition, Devices, DriveProtocol,
-    HealthConfig, Ingest, Malformed, MotorName, Order, Role, Target, TargetError, Timeouts,
+    HealthConfig, Ingest, MotorName, Order, Role, Target, TargetError, Timeouts,
 };
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
@@ -37,7 +37,7 @@ impl DriveProtocol for Plain {
 
     fn decode(&mut self, frame: &CanFrame) -> Ingest {
         let [a, b, c, d, e, f, g, h] = *frame.data() else {
-            return Ingest::Malformed(Malformed::Length(frame.length()));
+            return Ingest::WrongLength(frame.length());
         };
         (self.angle, self.velocity) =
             (f32::from_le_bytes([a, b, c, d]), f32::from_le_bytes([e, f, g, h]));

@@ -12,7 +12,7 @@ use drivetrain::dji::{
 use drivetrain::encoder::{Position, shortest};
 use drivetrain::frame::CanFrame;
 use drivetrain::math::{wrap, wrap_pi, wrap_positive, wrap_tau};
-use drivetrain::motor::{Ingest, Malformed, TargetError};
+use drivetrain::motor::{Ingest, TargetError};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, Current, Voltage};
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
@@ -436,8 +436,8 @@ fn every_standard_frame_is_for_exactly_its_motor() {
                     let expected = match (ours, length, angle_high) {
                         (false, ..) => Ingest::Unrelated,
                         (true, 8, 0) => Ingest::Taken,
-                        (true, 8, _) => Ingest::Malformed(Malformed::Field),
-                        (true, ..) => Ingest::Malformed(Malformed::Length(frame.length())),
+                        (true, 8, _) => Ingest::WrongField,
+                        (true, ..) => Ingest::WrongLength(frame.length()),
                     };
                     assert_eq!(bus.ingest(&frame, at_us(raw)), expected, "{frame:?}");
                     unattached += u32::from(family && !ours);

@@ -10,7 +10,7 @@ use drivetrain::control::PidConfig;
 use drivetrain::dji::{AnyHandle, Bus, Config, Gm6020Voltage, M2006, M3508};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    ArmError, Condition, HealthConfig, Ingest, Link, Malformed, Reaction, TargetError, Timeouts,
+    ArmError, Condition, HealthConfig, Ingest, Link, Reaction, TargetError, Timeouts,
 };
 use drivetrain::time::TimeStep;
 use drivetrain::time::{Duration, Instant, Tick};
@@ -307,11 +307,11 @@ impl Soak {
                 books.unattached = books.unattached.saturating_add(u32::from(family));
             }
             (Some(_), 0..=7, _) => {
-                assert_eq!(outcome, Ingest::Malformed(Malformed::Length(frame.length())));
+                assert_eq!(outcome, Ingest::WrongLength(frame.length()));
                 books.bad_length = books.bad_length.saturating_add(1);
             }
             (Some(_), _, 0x20..) => {
-                assert_eq!(outcome, Ingest::Malformed(Malformed::Field), "{frame:?}");
+                assert_eq!(outcome, Ingest::WrongField, "{frame:?}");
                 books.bad_field = books.bad_field.saturating_add(1);
             }
             (Some(owner), ..) => {

@@ -5,7 +5,7 @@ use drivetrain::dji::{self, AnyHandle, Bus, Config, Gm6020Current, Gm6020Voltage
 use drivetrain::encoder::{GearRatio, Position};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    Actuator, CanDevice, Claim, DriveProtocol, ImpedanceControl, Ingest, Malformed, MotorName, Role,
+    Actuator, CanDevice, Claim, DriveProtocol, ImpedanceControl, Ingest, MotorName, Role,
 };
 use drivetrain::time::Instant;
 use drivetrain::units::AngularVelocity;
@@ -160,7 +160,7 @@ impl Listener for Lk {
             return Ingest::Unrelated;
         }
         if frame.length() != 8 {
-            return Ingest::Malformed(Malformed::Length(frame.length()));
+            return Ingest::WrongLength(frame.length());
         }
         let data = frame.bytes();
         if let Some(state) = lk::State::decode(data) {
@@ -170,7 +170,7 @@ impl Listener for Lk {
         let Some(feedback) = lk::Feedback::decode(data).filter(|_| data[1] != 0) else {
             return Ingest::Unrelated;
         };
-        let Some(phase) = self.phase(&feedback) else { return Ingest::Malformed(Malformed::Field) };
+        let Some(phase) = self.phase(&feedback) else { return Ingest::WrongField };
         self.rotor = match self.drive.and_then(|before| self.phase(&before)) {
             Some(before) => self.rotor + i64::from(phase.wrapping_sub(before).cast_signed()),
             None => phase.into(),

@@ -100,7 +100,7 @@ impl Account {
                 self.note(now, gap);
                 Some(true)
             }
-            Ingest::Malformed(_) => {
+            Ingest::WrongLength(_) | Ingest::WrongField => {
                 self.malformed += 1;
                 Some(false)
             }

@@ -289,7 +289,7 @@ impl Story {
                     known.raw = value;
                 }
             }
-            Ingest::Malformed(_) => self.malformed += 1,
+            Ingest::WrongLength(_) | Ingest::WrongField => self.malformed += 1,
             Ingest::Unrelated => self.unrelated += 1,
         }
     }

@@ -467,7 +467,7 @@ impl CanDevice for Watched {
         let outcome = self.noting_trips(|bus| bus.ingest(frame, now));
         let verdict = match outcome {
             Ingest::Taken => Verdict::Taken,
-            Ingest::Malformed(_) => Verdict::Malformed,
+            Ingest::WrongLength(_) | Ingest::WrongField => Verdict::Malformed,
             Ingest::Unrelated if expected == Verdict::Unattached => Verdict::Unattached,
             Ingest::Unrelated => Verdict::Unrelated,
         };

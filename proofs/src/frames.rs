@@ -5,7 +5,7 @@ use drivetrain::dji::{
     AnyHandle, AttachError, Bus, Config, Counters, Gm6020Voltage, Handle, M2006, M3508, Model,
 };
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{Condition, Health, Ingest, Malformed};
+use drivetrain::motor::{Condition, Health, Ingest};
 use drivetrain::time::{Instant, Tick};
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 
@@ -92,9 +92,9 @@ pub extern "C" fn route(bus: &mut Bus, frame: &CanFrame, now_us: u32) -> u32 {
     match bus.ingest(frame, Instant::from_micros(u64::from(now_us))) {
         Ingest::Taken => 1,
         Ingest::Unrelated => 2,
-        Ingest::Malformed(Malformed::Length(length)) if length == frame.length() => 3,
-        Ingest::Malformed(Malformed::Field) => 4,
-        Ingest::Malformed(_) => 5,
+        Ingest::WrongLength(length) if length == frame.length() => 3,
+        Ingest::WrongField => 4,
+        Ingest::WrongLength(_) => 5,
     }
 }
 

@@ -8,8 +8,8 @@ use crate::error::ConfigError;
 use crate::frame::{CanFrame, standard_id};
 use crate::motor::Impedance;
 use crate::motor::{
-    Capabilities, Capability, Claim, DriveProtocol, Ingest, Inquiry, Malformed, MotorName, Order,
-    Preparation, Role, Settings, TimeoutUnits, Vitals, WrongSetting, register_questions,
+    Capabilities, Capability, Claim, DriveProtocol, Ingest, Inquiry, MotorName, Order, Preparation,
+    Role, Settings, TimeoutUnits, Vitals, WrongSetting, register_questions,
 };
 use crate::time::Duration;
 use crate::units::{Angle, AngularVelocity};
@@ -162,7 +162,7 @@ impl DriveProtocol for Motor {
 
     fn decode(&mut self, frame: &CanFrame) -> Ingest {
         if frame.length() != 8 {
-            return Ingest::Malformed(Malformed::Length(frame.length()));
+            return Ingest::WrongLength(frame.length());
         }
         let data = frame.bytes();
         let [head, ..] = *data;
@@ -170,7 +170,7 @@ impl DriveProtocol for Motor {
             return Ingest::Unrelated;
         }
         let Some(feedback) = Feedback::decode(data, self.model.ranges()) else {
-            return Ingest::Malformed(Malformed::Field);
+            return Ingest::WrongField;
         };
         self.drive = Some(feedback);
         Ingest::Taken

@@ -10,7 +10,7 @@ use super::slot::health::CheckRound;
 use super::slot::{Slot, Surroundings, gap, health};
 use super::{CommandFrame, Feedback};
 use crate::frame::CanFrame;
-use crate::motor::{Ages, Condition, Hold, Ingest, Malformed, MotorName, Rival};
+use crate::motor::{Ages, Condition, Hold, Ingest, MotorName, Rival};
 use crate::time::{Edge, Instant};
 
 /// Takes any frame.
@@ -34,11 +34,11 @@ pub(super) fn ingest<const N: usize>(
     };
     if frame.length() != 8 {
         rejects.bad_length = rejects.bad_length.saturating_add(1);
-        return Ingest::Malformed(Malformed::Length(frame.length()));
+        return Ingest::WrongLength(frame.length());
     }
     let Some(feedback) = Feedback::decode(frame.bytes()) else {
         rejects.bad_field = rejects.bad_field.saturating_add(1);
-        return Ingest::Malformed(Malformed::Field);
+        return Ingest::WrongField;
     };
     let running = motors.guard.is_running();
     if running && has_nothing_new(motors, index, feedback, now) {

@@ -8,8 +8,8 @@ use crate::control::PidConfig;
 use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::{
-    Capabilities, Capability, Claim, DriveProtocol, Goal, Ingest, Malformed, MotorName, Order,
-    Questions, Role, Vitals, WrongSetting,
+    Capabilities, Capability, Claim, DriveProtocol, Goal, Ingest, MotorName, Order, Questions,
+    Role, Vitals, WrongSetting,
 };
 use crate::units::{Angle, AngularVelocity};
 
@@ -176,7 +176,7 @@ impl DriveProtocol for Motor {
 
     fn decode(&mut self, frame: &CanFrame) -> Ingest {
         if frame.length() != 8 {
-            return Ingest::Malformed(Malformed::Length(frame.length()));
+            return Ingest::WrongLength(frame.length());
         }
         let data = frame.bytes();
         let [code, ..] = *data;
@@ -186,7 +186,7 @@ impl DriveProtocol for Motor {
         }
         let Some(feedback) = Feedback::decode(data) else { return Ingest::Unrelated };
         let Some(phase) = feedback.phase(&self.model) else {
-            return Ingest::Malformed(Malformed::Field);
+            return Ingest::WrongField;
         };
         match self.drive.and_then(|drive| drive.phase(&self.model)) {
             Some(before) => self.rotor += i64::from(phase.wrapping_sub(before).cast_signed()),

@@ -73,7 +73,7 @@ impl Model {
     /// torque constant in Nm/A at the output shaft, 0.001 to 1000, and the number of encoder bits sent, 14 to 16.
     ///
     /// A drive with an encoder of 18 bits sends the upper 16. An encoder with fewer bits than are stated here is not noticed, and
-    /// its angles are too small by the power of two; feedback of an encoder with more is [malformed](crate::motor::Malformed::Field).
+    /// its angles are too small by the power of two; feedback of an encoder with more is [malformed](crate::motor::Ingest::WrongField).
     ///
     /// # Errors
     /// Names the first value outside its limits.

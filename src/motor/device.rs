@@ -121,19 +121,25 @@ pub enum Ingest {
     Taken,
     /// The frame belongs to another device; nothing changed.
     Unrelated,
-    /// The frame has the id of one of this device's motors, but not the form of its feedback; nothing changed.
-    Malformed(Malformed),
+    /// The frame has the id of one of this device's motors, but too few or too many bytes for its feedback: so many; nothing changed.
+    WrongLength(u8),
+    /// The frame has the id and the length of feedback, and a field with an impossible value; nothing changed.
+    WrongField,
 }
 
-/// Why a frame with a motor's id is not its feedback.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum Malformed {
-    /// Too few or too many bytes.
-    Length(u8),
-    /// A field has an impossible value.
-    Field,
+impl Ingest {
+    /// Returns whether a frame with the id of a motor was not its feedback.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::motor::Ingest;
+    ///
+    /// assert!(Ingest::WrongLength(7).is_malformed() && !Ingest::Unrelated.is_malformed());
+    /// ```
+    #[must_use]
+    pub const fn is_malformed(self) -> bool {
+        matches!(self, Self::WrongLength(_) | Self::WrongField)
+    }
 }
 
 /// An action on every device of [`Devices`](super::Devices).

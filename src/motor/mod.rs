@@ -79,7 +79,7 @@ pub use arming::{ArmError, ArmingSwitch, Missing, SwitchOrder, WrongSetting};
 pub use capability::{Capabilities, Capability};
 pub(crate) use claim::Route;
 pub use claim::{Claim, MotorName, Role};
-pub use device::{CanDevice, Ingest, Malformed, Visitor};
+pub use device::{CanDevice, Ingest, Visitor};
 pub use devices::Devices;
 pub(crate) use devices::ask;
 pub use drive::{AngleDrive, Measured, OneOf, TargetError, VelocityDrive};

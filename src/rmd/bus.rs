@@ -10,8 +10,8 @@ use crate::lk::bus::{SILENT, whole};
 use crate::lk::codec::{id_of, is_command};
 use crate::lk::model::RAD_PER_DEGREE;
 use crate::motor::{
-    Capabilities, Capability, Claim, DriveProtocol, Goal, Ingest, Malformed, MotorName, Order,
-    Questions, Role, Vitals, WrongSetting, lowest_bit,
+    Capabilities, Capability, Claim, DriveProtocol, Goal, Ingest, MotorName, Order, Questions,
+    Role, Vitals, WrongSetting, lowest_bit,
 };
 use crate::units::{Angle, AngularVelocity};
 
@@ -98,7 +98,7 @@ impl DriveProtocol for Motor {
 
     fn decode(&mut self, frame: &CanFrame) -> Ingest {
         if frame.length() != 8 {
-            return Ingest::Malformed(Malformed::Length(frame.length()));
+            return Ingest::WrongLength(frame.length());
         }
         let data = frame.bytes();
         let is_answer = [0x9C, 0xA1, self.mode.0.number].contains(&data[0]);

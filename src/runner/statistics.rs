@@ -202,7 +202,7 @@ impl Tally {
     #[inline(always)]
     pub(super) const fn reject(&mut self, outcome: Ingest) {
         self.rejected += 1;
-        if let Ingest::Malformed(_) = outcome {
+        if outcome.is_malformed() {
             self.malformed += 1;
         }
     }

@@ -3,7 +3,7 @@ use super::schedule::{self, Answers};
 use super::slot::{Slot, health};
 use super::{AttachError, Command, Config, Joint, Joints, Register, State};
 use crate::frame::CanFrame;
-use crate::motor::{BusLoad, DeviceGuard, Hold, Ingest, Link, Malformed, MotorName, Timeouts};
+use crate::motor::{BusLoad, DeviceGuard, Hold, Ingest, Link, MotorName, Timeouts};
 use crate::time::{Duration, Instant, Tick, TimeStep};
 use embedded_can::Frame;
 
@@ -158,10 +158,10 @@ impl Joints {
             }),
         }
         slot.bad_replies = slot.bad_replies.saturating_add(1);
-        Ingest::Malformed(match frame.length() {
-            6 => Malformed::Field,
-            length => Malformed::Length(length),
-        })
+        match frame.length() {
+            6 => Ingest::WrongField,
+            length => Ingest::WrongLength(length),
+        }
     }
 
     /// Chooses the joints for requests and writes, and relaxes joints that may not be driven.

@@ -9,8 +9,8 @@ use crate::encoder::Tachometer;
 use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::{
-    Capabilities, Capability, Claim, DriveProtocol, Ingest, Malformed, MotorName, Order, Role,
-    Vitals, WrongSetting,
+    Capabilities, Capability, Claim, DriveProtocol, Ingest, MotorName, Order, Role, Vitals,
+    WrongSetting,
 };
 use crate::units::{Angle, AngularVelocity};
 use embedded_can::{Frame, Id};
@@ -200,7 +200,7 @@ impl DriveProtocol for Motor {
         if self.take(packet, frame.data()) {
             Ingest::Taken
         } else {
-            Ingest::Malformed(Malformed::Length(frame.length()))
+            Ingest::WrongLength(frame.length())
         }
     }
 

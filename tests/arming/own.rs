@@ -2,7 +2,7 @@
 
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    Actuator, Claim, DriveProtocol, Ingest, Malformed, MotorName, Order, Role, Target, Vitals,
+    Actuator, Claim, DriveProtocol, Ingest, MotorName, Order, Role, Target, Vitals,
 };
 use drivetrain::units::AngularVelocity;
 use embedded_can::{Frame, Id, StandardId};
@@ -56,7 +56,7 @@ impl DriveProtocol for Mine {
     }
     fn decode(&mut self, frame: &CanFrame) -> Ingest {
         let [code, current, speed] = *frame.data() else {
-            return Ingest::Malformed(Malformed::Length(frame.length()));
+            return Ingest::WrongLength(frame.length());
         };
         let share = |byte: u8| f32::from(byte.cast_signed()) / 100.0;
         self.vitals = Vitals {

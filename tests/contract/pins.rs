@@ -2,8 +2,7 @@
 
 use super::*;
 use drivetrain::motor::{
-    ArmError, CanDevice, Claim, Condition, Ingest, Malformed, MotorName, Role, Visitor,
-    WrongSetting,
+    ArmError, CanDevice, Claim, Condition, Ingest, MotorName, Role, Visitor, WrongSetting,
 };
 use drivetrain::pwm::{Brushed, BrushedConfig, RcPwm};
 use drivetrain::time::{Duration, Edge, Instant, Tick};
@@ -146,7 +145,7 @@ impl<M: OnPins> CanDevice for Wired<M> {
             return Ingest::Unrelated;
         }
         let Ok(counter) = <[u8; 4]>::try_from(frame.data()) else {
-            return Ingest::Malformed(Malformed::Length(frame.length()));
+            return Ingest::WrongLength(frame.length());
         };
         self.now = self.now.max(now);
         self.motor.hear(u32::from_be_bytes(counter), now);

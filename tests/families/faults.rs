@@ -177,7 +177,7 @@ fn impossible(family: &Family) -> Outcome {
     let mut station = family.station().driven();
     let frame = station.drive.impossible()?;
     let outcome = station.device.ingest(&frame, station.now());
-    assert!(matches!(outcome, Ingest::Malformed(_)), "{outcome:?}");
+    assert!(outcome.is_malformed(), "{outcome:?}");
     Ok("refused".to_owned())
 }
 

@@ -5,7 +5,7 @@ use crate::rig::{Rig, armed, at_ms, feedback, rpm, step, ticks_since};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, M3508};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{Ingest, Link, Malformed};
+use drivetrain::motor::{Ingest, Link};
 use drivetrain::runner::{BusCondition, FrameQueue, Nb, Runner};
 use drivetrain::sim::{Fault, Line, Simulation};
 use drivetrain::time::{Duration, Instant, Tick};
@@ -100,7 +100,7 @@ fn f06_an_angle_above_8191_refuses_the_whole_frame() {
     let before = bus.state(wheel).unwrap();
     for angle in [8192, 9_000, u16::MAX] {
         let outcome = bus.ingest(&feedback(0x201, angle, 5_000), at_ms(2));
-        assert_eq!(outcome, Ingest::Malformed(Malformed::Field));
+        assert_eq!(outcome, Ingest::WrongField);
     }
     assert_eq!(bus.state(wheel), Some(before), "no half update");
     assert_eq!(bus.counters().bad_field, 3);

@@ -3,7 +3,7 @@
 use drivetrain::frame::CanFrame;
 use drivetrain::math::wrap_pi;
 use drivetrain::motor::Impedance;
-use drivetrain::motor::{Capabilities, Capability, Claim, Ingest, Malformed, MotorName, Order};
+use drivetrain::motor::{Capabilities, Capability, Claim, Ingest, MotorName, Order};
 use drivetrain::motor::{DriveProtocol, Role, Target, Vitals};
 use drivetrain::units::{Angle, AngularVelocity};
 use drivetrain::wire::mit::{self, Feedback, Ranges};
@@ -74,14 +74,14 @@ impl DriveProtocol for J4310 {
 
     fn decode(&mut self, frame: &CanFrame) -> Ingest {
         let [head, a, b, c, d, e, driver_c, rotor_c] = *frame.data() else {
-            return Ingest::Malformed(Malformed::Length(frame.length()));
+            return Ingest::WrongLength(frame.length());
         };
         if head & 0xF != self.id {
             return Ingest::Unrelated;
         }
         let status = head >> 4;
         if !matches!(status, 0 | 1 | 8..=14) {
-            return Ingest::Malformed(Malformed::Field);
+            return Ingest::WrongField;
         }
         self.status = Some(status);
         self.measured = RANGES.decode_feedback(&[a, b, c, d, e]);

@@ -12,7 +12,7 @@ use drivetrain::control::PidConfig;
 use drivetrain::error::ConfigError;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    Actuator, AngleDrive, Condition, Devices, DriveProtocol, Ingest, Malformed, VelocityDrive,
+    Actuator, AngleDrive, Condition, Devices, DriveProtocol, Ingest, VelocityDrive,
 };
 use drivetrain::odrive::{Endpoints, Feedback, Firmware, Heartbeat, Mode, Model, Motor};
 use drivetrain::sim::{Drive, DriveShaft, OdriveDrive};
@@ -631,7 +631,7 @@ fn frames_that_are_damaged_or_of_others_change_nothing() {
         for length in 0..8_u8 {
             let frame = CanFrame::new(id(number), &[0xFF; 8][..length.into()]).unwrap();
             let outcome = own.ingest(&frame, now);
-            assert_eq!(outcome, Ingest::Malformed(Malformed::Length(length)));
+            assert_eq!(outcome, Ingest::WrongLength(length));
         }
     }
     for data in [
@@ -640,11 +640,11 @@ fn frames_that_are_damaged_or_of_others_change_nothing() {
         [0, 0, 0, 0, 0, 0, 0x80, 0xFF],
     ] {
         let outcome = own.ingest(&CanFrame::of(id(0x69), data), now);
-        assert_eq!(outcome, Ingest::Malformed(Malformed::Field));
+        assert_eq!(outcome, Ingest::WrongField);
     }
     // A heartbeat of 0.6 that says "not calibrated" is none of 0.5.
     let frame = CanFrame::of(id(0x61), [0, 0, 0, 0, 1, 14, 0, 0]);
-    assert_eq!(own.ingest(&frame, now), Ingest::Malformed(Malformed::Field));
+    assert_eq!(own.ingest(&frame, now), Ingest::WrongField);
     assert_eq!(own.motor().heartbeat(), None);
     for other in [0x49, 0x89, 0x63, 0x65, 0x74] {
         assert_eq!(own.ingest(&CanFrame::of(id(other), good), now), Ingest::Unrelated, "{other:X}");

@@ -12,7 +12,7 @@ use drivetrain::error::ConfigError;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
     Actuator, AngleDrive, Condition, Devices, DriveProtocol, Impedance, ImpedanceControl, Ingest,
-    Link, Malformed, Timeouts, VelocityDrive,
+    Link, Timeouts, VelocityDrive,
 };
 use drivetrain::rmd::{Mode, Model, Motor};
 use drivetrain::sim::Drive;
@@ -460,7 +460,7 @@ fn a_frame_of_another_length_is_malformed_and_changes_nothing() {
             let short = CanFrame::new(frame.id(), &data[..usize::from(length)]).unwrap();
             let now = bench.now();
             let outcome = Devices::ingest(&mut bench.own, &short, now);
-            assert_eq!(outcome, Ingest::Malformed(Malformed::Length(length)));
+            assert_eq!(outcome, Ingest::WrongLength(length));
         }
     }
     assert_eq!(bench.own.motor().feedback(), Some(&before));

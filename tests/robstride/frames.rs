@@ -3,7 +3,7 @@
 use crate::bench::{Bench, operation};
 use crate::extended;
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{Devices, Ingest, Malformed};
+use drivetrain::motor::{Devices, Ingest};
 use drivetrain::sim::Drive;
 use embedded_can::{ExtendedId, Frame, StandardId};
 
@@ -21,7 +21,7 @@ fn a_frame_of_another_length_changes_nothing() {
             let id = ExtendedId::new(raw).unwrap();
             let frame = CanFrame::new(id, &data[..usize::from(length)]).unwrap();
             let outcome = Devices::ingest(&mut bench.own, &frame, now);
-            assert_eq!(outcome, Ingest::Malformed(Malformed::Length(length)), "{raw:X}");
+            assert_eq!(outcome, Ingest::WrongLength(length), "{raw:X}");
         }
     }
     assert_eq!(*bench.own.motor().feedback().unwrap(), before);
@@ -35,7 +35,7 @@ fn a_state_that_no_drive_has_changes_nothing() {
     let before = *bench.own.motor().feedback().unwrap();
     let now = bench.now();
     let outcome = Devices::ingest(&mut bench.own, &extended(0x02C0_01FD, [0xFF; 8]), now);
-    assert_eq!(outcome, Ingest::Malformed(Malformed::Field));
+    assert_eq!(outcome, Ingest::WrongField);
     assert_eq!(*bench.own.motor().feedback().unwrap(), before);
 }
 

@@ -231,6 +231,7 @@ fn motor() {
     (|names: [MotorName; 20]| Missing::collect(names.into_iter())).call();
     (|missing: &Missing| Missing::names(missing).count()).call();
     Missing::total.call();
+    Ingest::is_malformed.call();
     ArmingSwitch::new.call();
     ArmingSwitch::read.call();
     Missing::full_bus.call();

@@ -24,7 +24,7 @@ use super::*;
 use crate::control::PidConfig;
 use crate::encoder::{Homing, Position};
 use crate::frame::CanFrame;
-use crate::motor::{ArmError, CanDevice, Devices, Ingest, Link, Malformed, TargetError, Timeouts};
+use crate::motor::{ArmError, CanDevice, Devices, Ingest, Link, TargetError, Timeouts};
 use crate::time::{Duration, Instant, Tick};
 use crate::units::{Angle, AngularVelocity, Current, Voltage};
 use embedded_can::{ExtendedId, Frame, StandardId};

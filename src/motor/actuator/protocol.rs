@@ -3,9 +3,7 @@
 use crate::control::PidConfig;
 use crate::error::ConfigError;
 use crate::frame::CanFrame;
-use crate::motor::{
-    Capabilities, Capability, Claim, Ingest, Malformed, MotorName, Vitals, WrongSetting,
-};
+use crate::motor::{Capabilities, Capability, Claim, Ingest, MotorName, Vitals, WrongSetting};
 use crate::time::TimeStep;
 use crate::units::{Angle, AngularVelocity};
 use crate::wire::mit::Ranges;
@@ -21,7 +19,7 @@ use crate::wire::mit::impedance::Impedance;
 /// use drivetrain::control::{Pid, PidConfig};
 /// use drivetrain::frame::CanFrame;
 /// use drivetrain::motor::{
-///     Claim, Devices, Ingest, Malformed, MotorName, Order, Actuator, DriveProtocol, Role, Target, VelocityDrive,
+///     Claim, Devices, Ingest, MotorName, Order, Actuator, DriveProtocol, Role, Target, VelocityDrive,
 /// };
 /// use drivetrain::time::{Duration, Instant, Tick};
 /// use drivetrain::units::AngularVelocity;
@@ -39,7 +37,7 @@ use crate::wire::mit::impedance::Impedance;
 ///     }
 ///     fn decode(&mut self, frame: &CanFrame) -> Ingest {
 ///         let [high, low] = *frame.data() else {
-///             return Ingest::Malformed(Malformed::Length(frame.length()));
+///             return Ingest::WrongLength(frame.length());
 ///         };
 ///         self.rpm = i16::from_be_bytes([high, low]);
 ///         Ingest::Taken
@@ -81,7 +79,7 @@ pub trait DriveProtocol {
     /// Takes a data frame with an id of the motor's feedback.
     ///
     /// Returns [`Ingest::Unrelated`] if the frame is another motor's or no feedback: other devices are asked then. Returns
-    /// [`Ingest::Malformed`] if the frame is this motor's and damaged. In both cases the call must change nothing.
+    /// [`Ingest::WrongLength`] or [`Ingest::WrongField`] if the frame is this motor's and damaged. In both cases the call must change nothing.
     fn decode(&mut self, frame: &CanFrame) -> Ingest;
 
     /// Returns the measured velocity of the output shaft.
@@ -288,7 +286,7 @@ impl Impedance {
 /// Takes feedback of exactly 8 bytes. If `take` returns `None`, a field has an impossible value, and nothing has changed.
 pub(crate) fn ingest_eight(frame: &CanFrame, take: impl FnOnce(&[u8; 8]) -> Option<()>) -> Ingest {
     if frame.length() != 8 {
-        return Ingest::Malformed(Malformed::Length(frame.length()));
+        return Ingest::WrongLength(frame.length());
     }
-    take(frame.bytes()).map_or(Ingest::Malformed(Malformed::Field), |()| Ingest::Taken)
+    take(frame.bytes()).map_or(Ingest::WrongField, |()| Ingest::Taken)
 }

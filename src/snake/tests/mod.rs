@@ -12,7 +12,7 @@ mod safety;
 use super::*;
 use crate::encoder::{Homing, Position};
 use crate::frame::CanFrame;
-use crate::motor::{ArmError, Devices, Ingest, Link, Malformed, TargetError, Timeouts};
+use crate::motor::{ArmError, Devices, Ingest, Link, TargetError, Timeouts};
 use crate::time::{Duration, Instant, Tick};
 use crate::units::{Angle, AngularVelocity};
 use embedded_can::{Frame, StandardId};

@@ -22,11 +22,11 @@ fn what_is_no_reply_is_refused_counted_and_keeps_nothing_fresh() {
     let mut bench = Bench::armed(&[3]);
     let now = at_ms(bench.ms);
     let mut ingest = |id, data: &[u8]| bench.joints.ingest(&frame(id, data), now);
-    assert_eq!(ingest(3, &[4, 7, 0, 0, 0]), Ingest::Malformed(Malformed::Length(5)));
-    assert_eq!(ingest(3, &[4, 0x0D, 0, 0, 0, 0]), Ingest::Malformed(Malformed::Field));
-    assert_eq!(ingest(3, &[9, 7, 0, 0, 0, 0]), Ingest::Malformed(Malformed::Field));
-    assert_eq!(ingest(3, &[1, 0x10, 0, 0, 0, 1]), Ingest::Malformed(Malformed::Field));
-    assert_eq!(ingest(3, &[3, 7]), Ingest::Malformed(Malformed::Length(2)));
+    assert_eq!(ingest(3, &[4, 7, 0, 0, 0]), Ingest::WrongLength(5));
+    assert_eq!(ingest(3, &[4, 0x0D, 0, 0, 0, 0]), Ingest::WrongField);
+    assert_eq!(ingest(3, &[9, 7, 0, 0, 0, 0]), Ingest::WrongField);
+    assert_eq!(ingest(3, &[1, 0x10, 0, 0, 0, 1]), Ingest::WrongField);
+    assert_eq!(ingest(3, &[3, 7]), Ingest::WrongLength(2));
     assert_eq!(ingest(4, &[4, 7, 0, 0, 0, 0]), Ingest::Unrelated);
     assert_eq!(ingest(13, &[4, 7, 0, 0, 0, 0]), Ingest::Unrelated);
     let counters = bench.joints.counters();
