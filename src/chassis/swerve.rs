@@ -147,7 +147,7 @@ impl<const N: usize> Swerve<N> {
     /// * A module without a measured angle stands still, because its direction of push is unknown. The module keeps its
     ///   angle; a module never measured has no angle to keep, and gets the wanted angle, which its motor refuses.
     ///
-    /// Costs 659 instructions on a Cortex-M4F, for four modules (`docs/figures.md`).
+    /// Costs 738 instructions on a Cortex-M4F, for four modules (`docs/figures.md`).
     ///
     /// # Examples
     /// ```

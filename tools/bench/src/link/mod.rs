@@ -21,7 +21,7 @@ pub(crate) enum Heard {
     /// A frame of another node.
     Frame(CanFrame),
     /// A frame of ours, which was on the bus.
-    Actuator(CanFrame),
+    Own(CanFrame),
     /// An error frame of Linux: its class and its data, and what kind of error that is.
     Error(u32, Vec<u8>, ErrorKind),
     /// Anything else, in the form of candump.
