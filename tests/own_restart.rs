@@ -192,3 +192,15 @@ fn a_healthy_joint_keeps_its_zero() {
     bench.hear(4, 0.2, f32::NAN);
     assert_near(bench.angle(), 0.2);
 }
+
+#[test]
+fn a_gap_as_long_as_the_limit_of_late_feedback_is_no_silence() {
+    let limit = Duration::from_millis(300);
+    let timeouts = Timeouts::new().with_feedback(limit, Duration::from_millis(500)).unwrap();
+    for (gap_ms, expected) in [(300, Some(0.0)), (301, None)] {
+        let mut bench = Bench::new(false, 1.5);
+        bench.0 = bench.0.with_timeouts(timeouts);
+        bench.hear(2 + gap_ms, 1.5, 0.0);
+        assert_eq!(bench.angle(), expected, "{gap_ms} ms");
+    }
+}
