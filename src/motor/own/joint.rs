@@ -375,6 +375,27 @@ mod tests {
     }
 
     #[test]
+    fn a_spring_and_a_velocity_are_on_their_way_from_where_the_shaft_was_first() {
+        let velocity = AngularVelocity::from_rad_per_s;
+        let spring = |angle| {
+            let angle = Angle::from_radians(angle);
+            Target::Impedance(Impedance { angle, torque_nm: 3.0, ..Impedance::FREE })
+        };
+        let mut start = Start::NONE;
+        for (opened, here, angle, speed) in [
+            (0.0, 1.0, 1.0, 2.0),
+            (0.25, 1.5, 2.0, 4.0),
+            (0.5, 9.0, 3.0, 6.0),
+            (1.0, 9.0, 5.0, 10.0),
+        ] {
+            let shaft = (Some(Angle::from_radians(here)), velocity(2.0 * here));
+            assert_eq!(start.goal(spring(5.0), opened, shaft, None), spring(angle));
+            let goal = start.goal(Target::Velocity(velocity(10.0)), opened, shaft, None);
+            assert_eq!(goal, Target::Velocity(velocity(speed)));
+        }
+    }
+
+    #[test]
     fn an_outward_torque_fades_with_the_way_and_with_the_velocity_and_an_inward_one_never() {
         for (here, velocity, expected) in [
             (0.0, 0.0, 3.0),
