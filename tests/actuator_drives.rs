@@ -6,7 +6,7 @@
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
     Actuator, AngleDrive, ArmError, Capabilities, Capability, Claim, Condition, DriveProtocol,
-    Ingest, MotorName, Order, Role, Target, TargetError, VelocityDrive,
+    Ingest, MotorName, Order, Role, Target, TargetError, VelocityDrive, WrongSetting,
 };
 use drivetrain::motor::{Devices, HealthConfig, Vitals};
 use drivetrain::time::{Duration, Instant, Tick};
@@ -31,6 +31,8 @@ struct Tool {
     share: f32,
     temperature_c: i16,
     angle_degrees: u8,
+    /// Whether the setting of the drive is known, for a drive with one.
+    setting: Option<bool>,
     resets: u32,
 }
 
@@ -48,6 +50,7 @@ impl Tool {
         share: f32::NAN,
         temperature_c: 30,
         angle_degrees: 30,
+        setting: None,
         resets: 0,
     };
     /// A drive without them.
@@ -122,12 +125,37 @@ impl DriveProtocol for Tool {
     fn is_enabled(&self) -> Option<bool> {
         self.report
     }
+    fn inquire(&mut self) -> Option<CanFrame> {
+        self.setting.map(|_| question())
+    }
+    fn decode_answer(&mut self, frame: &CanFrame) -> bool {
+        let is_answer = self.setting.is_some() && *frame == answer();
+        self.setting = self.setting.map(|is_known| is_known || is_answer);
+        is_answer
+    }
+    fn wrong_setting(&self) -> Option<WrongSetting> {
+        let motor = self.name();
+        let wrong = WrongSetting { motor, setting: "mode", expected: 1.0, found: None };
+        self.setting.is_some_and(|is_known| !is_known).then_some(wrong)
+    }
+    fn forget_settings(&mut self) {
+        self.setting = self.setting.map(|_| false);
+    }
     fn capabilities(&self) -> Capabilities {
         self.offers
     }
     fn vitals(&self) -> Vitals {
         Vitals { temperature_c: Some(self.temperature_c), ..Vitals::default() }
     }
+}
+
+/// The question of a drive with a setting.
+fn question() -> CanFrame {
+    CanFrame::of(id(0x303), [9])
+}
+
+fn answer() -> CanFrame {
+    CanFrame::of(id(0x382), [9])
 }
 
 /// What the drive reports of its power.
@@ -287,6 +315,20 @@ fn a_drive_at_rest_is_reminded_also_where_the_clock_was_set_back() {
     assert_eq!(power(1..=150, || bench.idle()), [(1, 0), (101, 0)]);
 }
 
+#[test]
+fn a_drive_is_told_once_at_one_time() {
+    for report in [Report::None, Report::Always(true)] {
+        let mut bench = Bench::new(Tool::POWERED, report);
+        assert_eq!(power(1..=1, || bench.idle()), [(1, 0)]);
+        let again = power(2..=5, || {
+            let tick = bench.tick();
+            bench.own.update(tick);
+            bench.drain()
+        });
+        assert_eq!(again, [], "{report:?}");
+    }
+}
+
 /// The output opens when the drive is enabled, however long after arming that is.
 #[test]
 fn a_drive_that_is_enabled_late_opens_from_zero() {
@@ -438,6 +480,69 @@ fn a_frame_that_is_given_back_comes_again_with_the_next_update() {
     assert!(strangers.iter().all(|frame| !bench.own.requeue(frame)));
     let remote = CanFrame::new_remote(id(0x304), 1).unwrap();
     assert!(!bench.own.requeue(&remote));
+}
+
+#[test]
+fn a_frame_that_is_given_back_after_the_drive_followed_does_not_come_again() {
+    let enable = CanFrame::of(id(0x304), [1]);
+    let mut bench = Bench::armed(Tool::POWERED, Report::Follows);
+    assert_eq!(bench.live()[0], enable);
+    assert!(drives(&bench.live()), "the drive said enabled");
+    _ = bench.own.requeue(&enable);
+    assert_eq!(power(1..=50, || bench.live()), []);
+}
+
+#[test]
+fn a_frame_that_waits_to_enable_a_drive_is_not_sent_while_its_motor_is_late() {
+    let mut bench = Bench::armed(Tool::POWERED, Report::Follows);
+    bench.own.set_torque(2.0).unwrap();
+    for gap_ms in [1, 20] {
+        bench.ms += gap_ms;
+        let tick = bench.tick();
+        bench.own.update(tick);
+    }
+    assert!(bench.drain().iter().all(|frame| frame.id() != id(0x304)));
+    assert_eq!(bench.live()[0], CanFrame::of(id(0x304), [1]), "heard again");
+}
+
+#[test]
+fn a_drive_that_was_late_tells_its_setting_again_before_it_is_armed() {
+    let tool = Tool { setting: Some(false), ..Tool::POWERED };
+    let mut bench = Bench::new(tool, Report::Follows);
+    bench.idle();
+    assert_eq!(bench.own.ingest(&answer(), bench.now()), Ingest::Taken);
+    bench.idle();
+    assert_eq!(bench.own.motor().wrong_setting(), None);
+    bench.ms += 20;
+    let tick = bench.tick();
+    bench.own.update(tick);
+    bench.hear();
+    assert!(bench.own.motor().wrong_setting().is_some());
+    assert!(bench.own.arm(bench.now()).is_err());
+    bench.idle();
+    assert_eq!(bench.own.ingest(&answer(), bench.now()), Ingest::Taken);
+    bench.arm();
+}
+
+#[test]
+fn a_question_is_asked_each_10_ms_also_where_the_clock_was_set_back() {
+    let tool = Tool { setting: Some(false), ..Tool::POWERED };
+    let mut bench = Bench::new(tool, Report::Follows);
+    let asked = |bench: &mut Bench| -> Vec<u64> {
+        (1..=50).filter(|_| bench.idle().contains(&question())).collect()
+    };
+    let rhythm = |asked: &[u64]| asked.windows(2).all(|pair| pair[1] - pair[0] == 10);
+    let before = asked(&mut bench);
+    assert!(before.len() == 5 && rhythm(&before), "{before:?}");
+    bench.ms -= 900;
+    let after = asked(&mut bench);
+    assert!(after.len() == 5 && rhythm(&after), "{after:?}");
+    while !bench.idle().contains(&question()) {}
+    for _ in 0..5 {
+        let tick = bench.tick();
+        bench.own.update(tick);
+        assert!(!bench.drain().contains(&question()), "asked at this time already");
+    }
 }
 
 #[test]

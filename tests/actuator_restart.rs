@@ -307,3 +307,54 @@ fn a_joint_at_a_limit_is_told_once_over_late_feedback() {
     }
     assert_eq!(begun, 1);
 }
+
+#[test]
+fn turns_are_not_known_after_a_tenth_of_a_second_of_feedback_without_an_angle() {
+    for (silent_ms, expected) in [(98, Some(0.0)), (110, None), (300, None)] {
+        let mut bench = Bench::new(true, 4.0);
+        for ms in 3..3 + silent_ms {
+            bench.hear(ms, f32::NAN, 0.0);
+        }
+        bench.hear(3 + silent_ms, 4.0 - TAU, 0.0);
+        assert_eq!(bench.angle().map(f32::round), expected, "{silent_ms} ms");
+        assert_eq!(bench.0.is_armed(), expected.is_some());
+    }
+}
+
+#[test]
+fn a_gap_as_long_as_the_limit_of_late_feedback_is_no_silence() {
+    let limit = Duration::from_millis(300);
+    let timeouts = Timeouts::new().with_feedback(limit, Duration::from_millis(500)).unwrap();
+    for (gap_ms, expected) in [(300, Some(0.0)), (301, None)] {
+        let mut bench = Bench::new(false, 1.5);
+        bench.0 = bench.0.with_timeouts(timeouts);
+        bench.hear(2 + gap_ms, 1.5, 0.0);
+        assert_eq!(bench.angle(), expected, "{gap_ms} ms");
+    }
+}
+
+#[test]
+fn a_drive_that_knows_its_angle_has_soft_limits_from_its_own_zero() {
+    static LIMITS: HealthConfig =
+        HealthConfig::new().with_soft_limits(Angle::from_radians(-2.0), Angle::from_radians(0.7));
+    // The target of the joint, and that of a drive at 0.5 rad.
+    for (is_absolute, is_reversed, wanted, sent) in [
+        (true, false, 1.5, 0.7),
+        (true, false, -2.5, -2.0),
+        (true, true, 1.5, -0.7),
+        (true, true, -2.5, 2.0),
+        (false, false, 1.5, 1.5),
+    ] {
+        let drive = Plain { angle: 0.5, velocity: 0.0, is_absolute };
+        let own = Actuator::new(drive).with_opening(Duration::ZERO).with_health(&LIMITS).unwrap();
+        let mut bench = Bench(if is_reversed { own.reversed() } else { own });
+        for ms in 1..=3 {
+            bench.hear(ms, 0.5, 0.0);
+            bench.update(ms, 0.001);
+        }
+        bench.0.arm(at_ms(3)).unwrap();
+        bench.0.set_angle((), Angle::from_radians(wanted)).unwrap();
+        bench.hear(4, 0.5, 0.0);
+        assert_near(bench.update(4, 0.001), sent);
+    }
+}

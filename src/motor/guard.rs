@@ -480,6 +480,16 @@ mod tests {
     }
 
     #[test]
+    fn each_target_that_is_no_number_is_counted() {
+        let mut guard = driving();
+        let counts = [true, false, true, false, false].map(|is_finite| {
+            _ = guard.admit(is_finite);
+            guard.refused_targets()
+        });
+        assert_eq!(counts, [0, 1, 1, 2, 3]);
+    }
+
+    #[test]
     fn time_that_goes_back_is_never_fresh_for_ever() {
         for mut guard in [driving(), deaf()] {
             assert!(guard.drives(at_ms(5)));
@@ -520,6 +530,17 @@ mod tests {
         let mut guard = driving();
         guard.hear(at_ms(1_000));
         assert!(guard.is_missing(at_ms(2)) && !guard.drives(at_ms(2)));
+    }
+
+    #[test]
+    fn a_stamp_far_ahead_is_not_fresh_before_the_next_limit_either() {
+        let mut guard = driving();
+        assert!(
+            guard.drives(at_ms(2)) && guard.drives(at_ms(3)),
+            "no age exceeds its limit until 11 ms"
+        );
+        guard.hear(at_ms(20));
+        assert!(!guard.drives(at_ms(9)));
     }
 
     #[test]

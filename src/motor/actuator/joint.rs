@@ -365,6 +365,43 @@ mod tests {
     }
 
     #[test]
+    fn each_part_of_a_spring_is_that_of_the_drive_where_the_joint_is_turned_round() {
+        let zero = Zero::Placed(Angle::from_radians(0.5));
+        let joint = Joint { sign: -1.0, zero, ..Joint::DIRECT };
+        let spring = |angle, velocity, torque_nm| {
+            Target::Impedance(Impedance {
+                angle: Angle::from_radians(angle),
+                velocity: AngularVelocity::from_rad_per_s(velocity),
+                torque_nm,
+                ..Impedance::FREE
+            })
+        };
+        let of_drive = joint.target_of_drive(spring(1.25, 2.0, 3.0));
+        assert_eq!(of_drive, Ok(spring(-0.75, -2.0, -3.0)));
+    }
+
+    #[test]
+    fn a_spring_and_a_velocity_are_on_their_way_from_where_the_shaft_was_first() {
+        let velocity = AngularVelocity::from_rad_per_s;
+        let spring = |angle| {
+            let angle = Angle::from_radians(angle);
+            Target::Impedance(Impedance { angle, torque_nm: 3.0, ..Impedance::FREE })
+        };
+        let mut start = Start::NONE;
+        for (opened, here, angle, speed) in [
+            (0.0, 1.0, 1.0, 2.0),
+            (0.25, 1.5, 2.0, 4.0),
+            (0.5, 9.0, 3.0, 6.0),
+            (1.0, 9.0, 5.0, 10.0),
+        ] {
+            let shaft = (Some(Angle::from_radians(here)), velocity(2.0 * here));
+            assert_eq!(start.goal(spring(5.0), opened, shaft, None), spring(angle));
+            let goal = start.goal(Target::Velocity(velocity(10.0)), opened, shaft, None);
+            assert_eq!(goal, Target::Velocity(velocity(speed)));
+        }
+    }
+
+    #[test]
     fn an_outward_torque_fades_then_brakes_with_way_and_velocity_and_an_inward_one_stays() {
         for (here, velocity, expected) in [
             (0.0, 0.0, 3.0),
@@ -426,6 +463,21 @@ mod tests {
     }
 
     #[test]
+    fn a_spring_has_the_limits_of_its_angle_and_of_its_velocity() {
+        for (here, side, expected) in [(1.9, 1.0, (2.0, 1.0)), (-0.8, -1.0, (-1.0, -2.0))] {
+            let spring = Impedance {
+                angle: Angle::from_radians(9.0 * side),
+                velocity: AngularVelocity::from_rad_per_s(5.0 * side),
+                ..Impedance::FREE
+            };
+            let target = inside(here, 0.0).target(Target::Impedance(spring));
+            let Target::Impedance(sent) = target else { panic!() };
+            assert!((sent.angle.as_radians() - expected.0).abs() < 1e-5, "{here}: {sent:?}");
+            assert!((sent.velocity.as_rad_per_s() - expected.1).abs() < 1e-5, "{here}: {sent:?}");
+        }
+    }
+
+    #[test]
     fn an_angle_is_reached_inside_and_one_outside_is_the_limit_next_to_it() {
         let wide = |here| Inside { lower: -4.0, upper: 4.0, here, velocity: 0.0 };
         let narrow = |here| inside(here, 0.0);
@@ -443,6 +495,8 @@ mod tests {
             (wide(4.0), 4.0, 4.0),
             (wide(3.2), 4.5, 4.0), // a limit, and not 4.5 rad less a turn
             (wide(0.0), -4.5, -4.0),
+            (wide(9.0), 9.5 - TAU, 9.5 - TAU), // inside lies -3.07 rad too, a turn further
+            (wide(-9.0), TAU - 9.5, TAU - 9.5),
         ] {
             let target = Target::Angle(Angle::from_radians(wanted));
             let Target::Angle(sent) = inside.target(target) else { panic!() };

@@ -414,6 +414,23 @@ mod tests {
     }
 
     #[test]
+    fn a_range_is_closed_before_its_beginning_and_open_after_a_pause_of_any_length() {
+        let opening = || {
+            let mut motor = MotorGuard::NEW.with(OPENING, false);
+            motor.open(20_000);
+            motor
+        };
+        let mut motor = opening();
+        motor.forget_bygones(15_000, false);
+        assert_eq!(motor.share(15_000).to_bits(), 0.0_f32.to_bits(), "5 ms before");
+        for pause_us in [60_000_001, 2_400_000_000, 4_290_000_000_u32] {
+            let (mut motor, now) = (opening(), pause_us.wrapping_add(20_000));
+            motor.forget_bygones(now, true);
+            assert_eq!(motor.share(now).to_bits(), 1.0_f32.to_bits(), "{pause_us} us");
+        }
+    }
+
+    #[test]
     fn feedback_in_time_is_counted_beside_the_gap_that_is_trusted() {
         let mut motor = MotorGuard::NEW;
         motor.hear(1_000, &Timeouts::new());
