@@ -159,7 +159,8 @@ impl<M: DriveProtocol> Actuator<M> {
         Ok(self)
     }
 
-    /// Makes the present angle of the joint so much; the shaft follows its target as before.
+    /// Makes the present angle of the joint so much; the shaft follows its target as before, unless the angle is beyond a soft limit: the joint
+    /// then moves back as after arming.
     ///
     /// A drive without [`Capability::AbsoluteAngle`] counts from another angle when it has lost its supply. Once no feedback was taken for
     /// 100 ms, or for longer where it is late only then, or an angle is further away than the shaft turned since the feedback before, the
