@@ -199,11 +199,104 @@ static WIDE: HealthConfig =
 /// A joint with soft limits wider than a turn, whose drive counts so far.
 fn limited(is_absolute: bool, angle: f32) -> Bench {
     let drive = Plain { angle, velocity: 0.0, is_absolute };
-    let own = Actuator::new(drive).with_opening(Duration::ZERO).with_health(&WIDE).unwrap();
-    let mut bench = Bench(own);
+    let mut joint = Actuator::new(drive).with_opening(Duration::ZERO);
+    if is_absolute {
+        joint = joint.with_zero(Angle::ZERO).unwrap();
+    }
+    let mut bench = Bench(joint.with_health(&WIDE).unwrap());
     bench.hear(1, angle, 0.0);
     bench.update(1, 0.001);
+    bench.0.set_present_angle(Angle::from_radians(angle)).unwrap();
+    bench.hear(1, angle, 0.0);
     bench
+}
+
+static NARROW: HealthConfig =
+    HealthConfig::new().with_soft_limits(Angle::from_degrees(-30.0), Angle::from_degrees(30.0));
+
+/// A drive that knows its angle, with narrow limits around its zero, which is given or not.
+fn narrow(is_given: bool) -> Bench {
+    let drive = Plain { angle: 0.0, velocity: 0.0, is_absolute: true };
+    let joint = Actuator::new(drive).with_opening(Duration::ZERO).with_health(&NARROW).unwrap();
+    Bench(if is_given { joint.with_zero(Angle::ZERO).unwrap() } else { joint })
+}
+
+#[test]
+fn limits_of_a_turn_and_more_need_a_zero() {
+    let drive = Plain { angle: 0.0, velocity: 0.0, is_absolute: true };
+    let refused = Actuator::new(drive).with_health(&WIDE).err();
+    assert_eq!(refused, Some("soft limits of a turn and more, without a zero"));
+    assert!(Actuator::new(drive).with_zero(Angle::ZERO).unwrap().with_health(&WIDE).is_ok());
+    assert!(Actuator::new(Plain { is_absolute: false, ..drive }).with_health(&WIDE).is_ok());
+}
+
+/// -10 degrees are 350 degrees of a drive that counts from 0 to a turn.
+#[test]
+fn a_joint_is_heard_first_within_half_a_turn_of_the_middle_of_its_limits() {
+    for is_given in [true, false] {
+        let mut bench = narrow(is_given);
+        for ms in 1..=10 {
+            bench.hear(ms, 350_f32.to_radians(), 0.0);
+            bench.update(ms, 0.001);
+        }
+        assert_near(bench.angle(), -10_f32.to_radians());
+        bench.0.arm(at_ms(10)).unwrap();
+        bench.0.set_angle((), Angle::ZERO).unwrap();
+        bench.hear(11, 350_f32.to_radians(), 0.0);
+        assert_near(bench.update(11, 0.001), TAU);
+    }
+}
+
+/// An armed joint is placed when its angle comes, and rests until then.
+#[test]
+fn a_joint_whose_angle_comes_late_has_its_limits_from_then_on() {
+    for is_given in [true, false] {
+        let mut bench = narrow(is_given);
+        for ms in 1..60 {
+            bench.hear(ms, f32::NAN, 0.0);
+            if ms == 10 {
+                bench.0.arm(at_ms(10)).unwrap();
+            }
+            if ms >= 10 && !is_given {
+                assert!(bench.0.health().conditions.contains(Condition::SoftLimit));
+            }
+            assert_eq!(bench.update(ms, 0.001), None);
+        }
+        bench.hear(60, 0.2, 0.0);
+        bench.update(60, 0.001);
+        bench.hear(61, 0.2, 0.0);
+        bench.0.set_angle((), Angle::from_radians(1.5)).unwrap();
+        assert_near(bench.update(61, 0.001), 30_f32.to_radians());
+    }
+}
+
+/// The first frame after a silence has no angle yet.
+#[test]
+fn a_silence_before_an_angle_that_comes_later_takes_no_zero_of_a_drive_that_knows_its_angle() {
+    let mut bench = Bench::new(true, 1.0);
+    bench.hear(300, f32::NAN, 0.0);
+    bench.hear(320, 1.2, 0.0);
+    assert_near(bench.angle(), 0.2);
+    bench.hear(600, f32::NAN, 0.0);
+    bench.hear(620, 1.2 - TAU, 0.0);
+    assert_near(bench.angle(), 0.2);
+}
+
+/// From one end of the range of a drive that counts over two turns each way to the other.
+#[test]
+fn a_count_that_wraps_in_a_silence_is_no_motion() {
+    let mut bench = Bench::new(true, 12.5);
+    bench.hear(202, -12.5, 0.0);
+    assert_near(bench.angle(), 4.0 * TAU - 25.0);
+}
+
+#[test]
+fn a_forgotten_zero_takes_the_target_with_it() {
+    let mut bench = Bench::new(true, 0.9);
+    bench.0.set_angle((), Angle::ZERO).unwrap();
+    bench.0.forget_zero();
+    bench.hear(3, 0.9, 0.0);
+    assert_eq!(bench.update(3, 0.001), None);
 }
 
 fn edges(bench: &mut Bench) -> Vec<(Condition, bool)> {
@@ -223,7 +316,7 @@ fn a_joint_with_soft_limits_counts_as_its_drive_and_keeps_its_turns_over_a_resta
 #[test]
 fn a_joint_that_turned_in_a_silence_is_where_its_drive_counts() {
     let mut bench = limited(true, 0.3);
-    for (ms, angle) in [(500, 6.4), (1_000, -7.0)] {
+    for (ms, angle) in [(500, 6.4), (1_000, 9.9)] {
         bench.hear(ms, angle, 0.0);
         assert_near(bench.angle(), angle);
     }

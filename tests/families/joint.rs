@@ -87,7 +87,10 @@ fn a_joint_goes_to_angles_from_its_own_zero() {
 #[test]
 fn a_zero_found_by_the_program_ends_with_a_silence_of_100_ms_unless_the_drive_knows_its_angle() {
     for family in FAMILIES.iter().filter(|family| !["damiao", "robstride"].contains(&family.name)) {
-        let mut station = family.at_position().settled();
+        // In its position mode a VESC has an encoder.
+        let counts = family.modes.iter().find(|(mode, _)| *mode == "current, angle");
+        let make = || counts.map_or_else(|| family.at_position(), |(_, make)| make());
+        let mut station = make().settled();
         station.device.set_present_angle(1.0).unwrap();
         station.is_deaf = true;
         station.steps(80, |_| {});
@@ -101,7 +104,7 @@ fn a_zero_found_by_the_program_ends_with_a_silence_of_100_ms_unless_the_drive_kn
         station.is_deaf = false;
         lacks_its_zero(station, family.name);
         // The program itself stands still, and takes what the drive has sent before its next update.
-        let mut station = family.at_position().settled();
+        let mut station = make().settled();
         station.device.set_present_angle(1.0).unwrap();
         let last = station.heard.last().copied();
         station.now_us += 300_000;
@@ -110,6 +113,19 @@ fn a_zero_found_by_the_program_ends_with_a_silence_of_100_ms_unless_the_drive_kn
         }
         lacks_its_zero(station, family.name);
     }
+}
+
+#[test]
+fn a_zero_of_a_vesc_with_an_encoder_outlives_a_silence() {
+    let family = FAMILIES.iter().find(|family| family.name == "vesc").unwrap();
+    let mut station = family.at_position().settled();
+    station.device.set_present_angle(1.0).unwrap();
+    station.steps(50, |_| {});
+    station.is_deaf = true;
+    station.steps(300, |_| {});
+    station.is_deaf = false;
+    station.steps(150, |_| {});
+    assert!((station.device.angle_rad().unwrap() - 1.0).abs() < 1e-3);
 }
 
 fn lacks_its_zero(mut station: Station, family: &str) {

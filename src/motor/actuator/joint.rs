@@ -63,17 +63,16 @@ impl Joint {
     /// The joint turns and counts as its drive.
     pub(super) const DIRECT: Self = Self { sign: 1.0, zero: Zero::OfDrive, last: None };
 
-    /// Counts from the zero of the drive as the drive does, and over a loss of the supply, unless another zero is given.
-    pub(super) const fn keep_zero_of_drive(&mut self) {
-        if let Zero::OfDrive = self.zero {
-            self.zero = Zero::Placed(Angle::ZERO);
-        }
+    pub(super) const fn has_zero_of_drive(&self) -> bool {
+        matches!(self.zero, Zero::OfDrive)
     }
 
-    /// Places a given zero in the turn where the joint is heard first.
-    pub(super) fn place_zero(&mut self, measured: Option<Angle>) {
+    /// Places a given zero in the turn where the joint is heard first, within half a turn of its middle.
+    pub(super) fn place_zero(&mut self, measured: Option<Angle>, middle: Angle) {
         if let (Zero::Given(zero), Some(measured)) = (self.zero, measured) {
-            self.zero = Zero::Placed(measured - (measured - zero).wrapped());
+            let joint = (measured - zero) * self.sign;
+            let joint = middle + (joint - middle).wrapped();
+            self.zero = Zero::Placed(measured - joint * self.sign);
         }
     }
 
@@ -89,6 +88,7 @@ impl Joint {
     pub(super) fn follow(
         &mut self,
         reading: Option<Reading>,
+        at: u32,
         gap_us: u32,
         is_silence: bool,
     ) -> Option<Angle> {
@@ -96,6 +96,11 @@ impl Joint {
         self.last = reading.or(last);
         let (reading, last) = match (reading, last) {
             (Some(reading), Some(last)) => (reading, last),
+            // The angle comes with a later frame, and the turns are those of before.
+            (None, Some(last)) if is_silence && matches!(self.zero, Zero::Placed(_)) => {
+                self.last = Some(Reading { at, ..last });
+                return Some(Angle::ZERO);
+            }
             _ if is_silence => return self.lose_zero(),
             _ => return Some(Angle::ZERO),
         };
@@ -107,7 +112,11 @@ impl Joint {
         match &mut self.zero {
             _ if is_usual(way) => Some(Angle::ZERO),
             // Within a turn of its zero a drive may have started again, further away it has not.
-            Zero::Placed(_) if is_silence && reading.angle.as_radians().abs() > TAU => {
+            Zero::Placed(_)
+                if is_silence
+                    && reading.angle.as_radians().abs() > TAU
+                    && way.as_radians().abs() < 1.5 * TAU =>
+            {
                 Some(Angle::ZERO)
             }
             _ if !is_silence && gap_s > known_s => self.lose_zero(),
@@ -144,9 +153,9 @@ impl Joint {
         Ok(self.zero().ok_or(TargetError::NotHomed)? + angle * self.sign)
     }
 
-    /// Tells whether limits of the joint count: the joint has a zero.
+    /// Tells whether limits of the joint count: the joint has a zero, or is given one.
     pub(super) const fn has_limits(&self) -> bool {
-        self.depends_on_supply()
+        self.depends_on_supply() || matches!(self.zero, Zero::Given(_))
     }
 
     /// Returns the shaft between the limits of the joint; `None` without a zero or an angle.
@@ -194,8 +203,9 @@ pub(super) struct Inside {
 
 /// A shaft comes no sooner to a limit than in this time, in s, at its present velocity.
 const BRAKING_S: f32 = 0.1;
-/// Below this velocity in rad/s, a torque brakes in proportion to the velocity.
-const SLOW: f32 = 0.5;
+/// At a limit, a torque brakes in proportion to the velocity up to half of this, in rad/s: at a lower one, the torque would
+/// change its sign with each step of a light joint.
+const SLOW: f32 = 4.0;
 /// The way to a limit in rad over which an outward torque falls to zero.
 const FADING: f32 = 0.02;
 /// The longest way in rad to an angle, so that the shortest way leads in the same direction.
@@ -261,9 +271,10 @@ impl Inside {
         };
         let left = left.max(0.0);
         let most = left / BRAKING_S;
+        let excess = (outward - 0.5 * most).max(0.0);
         // Below zero, the torque brakes.
-        let share = 2.0 * (most - outward) / most.max(SLOW);
-        torque_nm * share.min(1.0).min(left / FADING).max(-1.0)
+        let share = (left / FADING).min(1.0) - 2.0 * excess / most.max(SLOW);
+        torque_nm * share.max(-1.0)
     }
 
     /// Returns the angle of this direction within the limits to which the way is shortest; otherwise the limit next to it. Of limits a turn
@@ -405,11 +416,11 @@ mod tests {
     fn an_outward_torque_fades_then_brakes_with_way_and_velocity_and_an_inward_one_stays() {
         for (here, velocity, expected) in [
             (0.0, 0.0, 3.0),
-            (1.99, 0.0, 1.2),  // 2 * 0.1 rad/s of 0.5
-            (1.99, -0.5, 1.5), // half of the last 0.02 rad
+            (1.99, 0.0, 1.5), // half of the last 0.02 rad
+            (1.99, -0.5, 1.5),
             (2.0, 0.0, 0.0),
             (2.5, 0.0, 0.0),
-            (2.5, 0.125, -1.5),
+            (2.5, 1.0, -1.5),
             (2.5, 7.0, -3.0),
             (2.5, -7.0, 0.0),
             (1.0, 5.0, 3.0), // at 10 rad/s the shaft is at the limit in 0.1 s
@@ -443,6 +454,21 @@ mod tests {
             let Target::Velocity(sent) = inside(here, 0.0).target(target) else { panic!() };
             assert!((sent.as_rad_per_s() - expected).abs() < 1e-4, "{here}, {wanted}: {sent:?}");
         }
+    }
+
+    /// 1400 rad/s² at most, with feedback that is a step old.
+    #[test]
+    fn a_light_joint_comes_to_rest_at_a_limit() {
+        let (mut angle, mut velocity, mut torque_nm) = (0.0, 0.0, 0.0);
+        let mut changes = 0;
+        for ms in 0..3_000 {
+            velocity += 1e-3 * torque_nm / 0.005;
+            angle += 1e-3 * velocity;
+            let next = inside(angle, velocity).torque(7.0);
+            changes += u32::from(ms > 2_000 && next * torque_nm < 0.0 && next.abs() > 0.01);
+            torque_nm = next;
+        }
+        assert!(changes == 0 && (angle - 2.0).abs() < 0.02, "{changes} changes, at {angle} rad");
     }
 
     #[test]

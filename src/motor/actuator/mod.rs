@@ -31,6 +31,7 @@ use crate::error::{ConfigError, finite};
 use crate::frame::CanFrame;
 use crate::time::{Duration, Instant};
 use crate::units::Angle;
+use core::f32::consts::TAU;
 use joint::{Inside, Joint, Start, Zero};
 use power::Power;
 
@@ -111,11 +112,18 @@ impl<M: DriveProtocol> Actuator<M> {
     /// Sets the checks of health and their reactions, as far as the motor's [`vitals`](DriveProtocol::vitals) tell.
     ///
     /// # Errors
-    /// Names the parameter without a sensible value.
+    /// Names the parameter without a sensible value. Soft limits of a turn and more need a [zero](Self::with_zero) before, for a drive with
+    /// [`Capability::AbsoluteAngle`]: such a drive may report another turn than that of the joint.
     pub fn with_health(mut self, config: &'static HealthConfig) -> Result<Self, &'static str> {
         self.watch = self.watch.with_config(config)?;
-        if config.soft_limits.is_some() && self.is_absolute() {
-            self.joint.keep_zero_of_drive();
+        if self.is_absolute() && self.joint.has_zero_of_drive() {
+            match config.soft_limits {
+                Some((lower, upper)) if upper - lower >= TAU => {
+                    return Err("soft limits of a turn and more, without a zero");
+                }
+                Some(_) => self.joint.zero = Zero::Given(Angle::ZERO),
+                None => {}
+            }
         }
         Ok(self)
     }
@@ -146,7 +154,7 @@ impl<M: DriveProtocol> Actuator<M> {
     }
 
     /// Takes the angle of the drive at which the joint is at zero, by a calibration. No drive keeps its turns without supply: the joint is
-    /// within half a turn of its zero when it is heard first, and turns by less than half a turn while its drive has no supply.
+    /// within half a turn of its zero, or of the middle of its soft limits, when it is heard first, and turns by less than half a turn while its drive has no supply.
     ///
     /// # Errors
     /// [`ConfigError::NotFinite`]; [`ConfigError::Unsupported`] for a drive without [`Capability::AbsoluteAngle`].
@@ -201,10 +209,11 @@ impl<M: DriveProtocol> Actuator<M> {
         Ok(())
     }
 
-    /// Forgets the zero of the joint, to look for it again. Until [`set_present_angle`](Self::set_present_angle), the joint has no angle, takes
+    /// Forgets the zero of the joint and its target, to look for the zero again. Until [`set_present_angle`](Self::set_present_angle), the joint has no angle, takes
     /// no angle as a target, and has no soft limits.
     pub const fn forget_zero(&mut self) {
         self.joint.forget_zero();
+        self.guard.relax();
     }
 
     /// Changes the motor's loops of this crate, from rad to rad/s and from rad/s to Nm, also while the motor is driven: each goes on as

@@ -5,6 +5,7 @@ use super::{Actuator, DriveProtocol, INQUIRY, Offered, Order, SILENCE_US, Target
 use crate::frame::CanFrame;
 use crate::motor::{Condition, Ingest, Link, Repeat, Role, Route, Vitals};
 use crate::time::{Instant, TimeStep};
+use crate::units::Angle;
 use embedded_can::Frame;
 
 /// Received frames: feedback, answers, and commands of another controller.
@@ -40,7 +41,7 @@ impl<M: DriveProtocol> Actuator<M> {
         }
         let (velocity, at) = (self.motor.velocity(), now.stamp());
         let reading = self.motor.angle().map(|angle| Reading { angle, velocity, at });
-        match self.joint.follow(reading, gap_us, is_silence) {
+        match self.joint.follow(reading, at, gap_us, is_silence) {
             None => {
                 self.guard.note(Condition::PositionUncertain, true, now);
                 self.fail(now);
@@ -152,7 +153,7 @@ impl<M: DriveProtocol> Actuator<M> {
         if was_online && !self.was_online {
             self.motor.forget_settings();
         }
-        self.joint.place_zero(self.measured_angle());
+        self.place_zero();
         let is_idle = !self.power.is_on() && !self.has_posted && self.offered.is_rest;
         let is_due = now < self.inquired || now.since(self.inquired) >= INQUIRY;
         if !is_idle || !is_due || self.motor.is_enabled() == Some(true) {
@@ -264,9 +265,16 @@ impl<M: DriveProtocol> Actuator<M> {
         self.start.goal(self.target, opened, shaft, inside)
     }
 
+    fn place_zero(&mut self) {
+        let (lower, upper) = self.watch.soft_limits().unwrap_or((0.0, 0.0));
+        let middle = Angle::from_radians(0.5 * (lower + upper));
+        self.joint.place_zero(self.measured_angle(), middle);
+    }
+
     /// Notes whether the shaft is at a soft limit.
     #[inline(never)]
     fn check_limits(&mut self, now: Instant) {
+        self.place_zero();
         let ((angle, _), inside) = self.shaft();
         let is_lost = angle.is_none() && self.joint.has_limits();
         if is_lost {

@@ -123,17 +123,18 @@ impl HealthConfig {
     /// Outside, the motor is driven inward only, also if the shaft starts there; at speed, already a little before. No effect while the
     /// absolute position is unknown: for a geared motor, until the position is set. A motor without CAN refuses soft limits.
     ///
-    /// An [`Actuator`](super::Actuator) keeps each kind of target inside, and has the edge from 0.02 rad before a limit:
+    /// An [`Actuator`](crate::motor::Actuator) keeps each kind of target inside, and has the edge from 0.02 rad before a limit:
     ///
     /// * An angle is reached by the shortest way that stays inside; an angle outside is the limit next to it.
     /// * An outward velocity is at most the distance to the limit divided by 0.1 s.
-    /// * An outward torque falls to zero from half of that velocity on and over the last 0.02 rad; at a higher velocity it brakes, with as much
-    ///   torque as the target has. So a small target stops a fast joint late, and a torque of zero never does.
+    /// * An outward torque falls to zero over the last 0.02 rad, and from half of that velocity on; at a higher velocity it brakes, with at most
+    ///   as much torque as the target has. So a small target stops a fast joint late, and a torque of zero never does.
     /// * Where the drive has no angle, beyond the range of its feedback, the motor rests.
     ///
-    /// The limits count from the zero of the joint: [given](super::Actuator::with_zero) or [set](super::Actuator::set_present_angle), otherwise that
-    /// of a drive with [`Capability::AbsoluteAngle`](super::Capability::AbsoluteAngle). Without a zero there are no limits, so a joint can look for
-    /// its stop.
+    /// The limits count from the zero of the joint: [given](crate::motor::Actuator::with_zero) or
+    /// [set](crate::motor::Actuator::set_present_angle), otherwise that of a drive with
+    /// [`Capability::AbsoluteAngle`](crate::motor::Capability::AbsoluteAngle). The joint is within half a turn of the middle of its limits when it is
+    /// heard first. Without a zero there are no limits, so a joint can look for its stop.
     ///
     /// # Examples
     /// ```

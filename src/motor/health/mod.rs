@@ -140,7 +140,7 @@ impl core::fmt::Display for Health {
 /// | [`Frozen`](Self::Frozen) | the feedback stands still in contradiction to itself | as configured; goes on |
 /// | [`Overspeed`](Self::Overspeed) | the reported speed is more than twice the speed without load | goes on |
 /// | [`DuplicateId`](Self::DuplicateId) | two motors answer with one id | is relaxed |
-/// | [`SoftLimit`](Self::SoftLimit) | the shaft is at or outside of a soft limit | turns inward only |
+/// | [`SoftLimit`](Self::SoftLimit) | the shaft is at or outside of a soft limit; of an actuator also 0.02 rad inside, and where its angle is not known | turns inward only; rests without an angle |
 /// | [`CommandLost`](Self::CommandLost) | the application let the target expire | is relaxed, until the next target |
 /// | [`SecondMaster`](Self::SecondMaster) | another node sends the command frame of the motor | as configured; goes on |
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
