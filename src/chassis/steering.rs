@@ -93,9 +93,8 @@ impl Module {
         memory: &mut Option<(Angle, bool)>,
         act: impl FnOnce(&mut Self) -> ModuleState,
     ) -> ModuleState {
-        let known = memory.filter(|(target, _)| target.is_finite());
-        let (target, reversed) = known.unwrap_or((Angle::ZERO, false));
-        let has_target = known.is_some();
+        let (target, reversed) = memory.unwrap_or((Angle::ZERO, false));
+        let has_target = memory.is_some();
         let mut module = Self { target_rad: target.as_radians(), has_target, reversed };
         let state = act(&mut module);
         let Self { target_rad, has_target, reversed } = module;

@@ -63,6 +63,12 @@ impl Joint {
     /// The joint turns and counts as its drive.
     pub(super) const DIRECT: Self = Self { sign: 1.0, zero: Zero::OfDrive, last: None };
 
+    /// Tells whether a zero is given and not placed.
+    #[inline]
+    pub(super) const fn awaits_zero(&self) -> bool {
+        matches!(self.zero, Zero::Given(_))
+    }
+
     pub(super) const fn has_zero_of_drive(&self) -> bool {
         matches!(self.zero, Zero::OfDrive)
     }
@@ -155,7 +161,7 @@ impl Joint {
 
     /// Tells whether limits of the joint count: the joint has a zero, or is given one.
     pub(super) const fn has_limits(&self) -> bool {
-        self.depends_on_supply() || matches!(self.zero, Zero::Given(_))
+        self.depends_on_supply() || self.awaits_zero()
     }
 
     /// Returns the shaft between the limits of the joint; `None` without a zero or an angle.

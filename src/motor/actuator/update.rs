@@ -265,7 +265,11 @@ impl<M: DriveProtocol> Actuator<M> {
         self.start.goal(self.target, opened, shaft, inside)
     }
 
+    #[inline]
     fn place_zero(&mut self) {
+        if !self.joint.awaits_zero() {
+            return;
+        }
         let (lower, upper) = self.watch.soft_limits().unwrap_or((0.0, 0.0));
         let middle = Angle::from_radians(0.5 * (lower + upper));
         self.joint.place_zero(self.measured_angle(), middle);
