@@ -1,11 +1,9 @@
 //! Motors of Damiao, in each control mode.
 
-use crate::functions::{device, family};
+use crate::functions::actuator;
 use crate::opaque::Function;
 use drivetrain::damiao::*;
-use drivetrain::motor::{
-    Actuator, AngleDrive, DriveProtocol, Impedance, ImpedanceControl, Order, VelocityDrive,
-};
+use drivetrain::motor::{Impedance, ImpedanceControl, Order};
 
 pub fn call_all() {
     Model::new.call();
@@ -58,15 +56,5 @@ fn motor() {
     Motor::write.call();
     Motor::store.call();
     Motor::register.call();
-    Motor::inquire.call();
-    Motor::decode_answer.call();
-    Motor::wrong_setting.call();
-    Motor::forget_settings.call();
-    Motor::poll.call();
-    Actuator::<Motor>::set_impedance.call();
-    Actuator::<Motor>::motor_mut.call();
-    (|own: &mut Actuator<Motor>, target| own.set_velocity((), target)).call();
-    (|own: &mut Actuator<Motor>, target| own.set_angle((), target)).call();
-    family::<Actuator<Motor>>();
-    device::<Actuator<Motor>>();
+    actuator::<Motor>();
 }

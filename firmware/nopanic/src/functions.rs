@@ -311,15 +311,9 @@ fn motor() {
     Actuator::<AnyMotor>::set_present_angle.call();
     Actuator::<AnyMotor>::forget_zero.call();
     Actuator::<AnyMotor>::set_loops.call();
-    Actuator::<AnyMotor>::set_torque.call();
-    Actuator::<AnyMotor>::set_impedance.call();
-    Actuator::<AnyMotor>::motor_mut.call();
     Actuator::<AnyMotor>::load.call();
-    (|own: &mut Actuator<AnyMotor>, target| own.set_velocity((), target)).call();
-    (|own: &mut Actuator<AnyMotor>, target| own.set_angle((), target)).call();
     (|own: &Actuator<AnyMotor>| (own.velocity(()), own.angle(()))).call();
-    family::<Actuator<AnyMotor>>();
-    device::<Actuator<AnyMotor>>();
+    actuator::<AnyMotor>();
     MotorName::new.call();
     MotorName::model.call();
     MotorName::id.call();
@@ -342,6 +336,24 @@ impl Devices for Robot {
         self.chassis.visit(visitor);
         self.arm.visit(visitor);
     }
+}
+
+/// The calls of each family of actuators, for its protocol and its device.
+pub fn actuator<M: DriveProtocol + 'static>() {
+    (|motor: &mut M, sent: u8| motor.enable(sent)).call();
+    (|motor: &mut M| motor.disable()).call();
+    (|motor: &mut M| motor.poll()).call();
+    (|motor: &mut M| motor.inquire()).call();
+    (|motor: &mut M, frame: &CanFrame| motor.decode_answer(frame)).call();
+    (|motor: &M| motor.wrong_setting()).call();
+    (|motor: &mut M| motor.forget_settings()).call();
+    Actuator::<M>::motor_mut.call();
+    Actuator::<M>::set_torque.call();
+    Actuator::<M>::set_impedance.call();
+    (|own: &mut Actuator<M>, target| own.set_velocity((), target)).call();
+    (|own: &mut Actuator<M>, target| own.set_angle((), target)).call();
+    family::<Actuator<M>>();
+    device::<Actuator<M>>();
 }
 
 /// The trait of each family.

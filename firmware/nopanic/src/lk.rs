@@ -1,9 +1,9 @@
 //! Motors of LK-TECH, in each control mode.
 
-use crate::functions::{device, family};
+use crate::functions::actuator;
 use crate::opaque::Function;
 use drivetrain::lk::*;
-use drivetrain::motor::{Actuator, AngleDrive, DriveProtocol, ImpedanceControl, VelocityDrive};
+use drivetrain::motor::ImpedanceControl;
 
 pub fn call_all() {
     Series::amperes_per_count.call();
@@ -31,15 +31,5 @@ fn motor() {
     (|model, id, mode: Mode| Motor::new(model, id, mode)).call();
     Motor::feedback.call();
     Motor::state.call();
-    Motor::inquire.call();
-    Motor::decode_answer.call();
-    Motor::wrong_setting.call();
-    Motor::forget_settings.call();
-    Motor::poll.call();
-    Actuator::<Motor>::set_impedance.call();
-    Actuator::<Motor>::motor_mut.call();
-    (|own: &mut Actuator<Motor>, target| own.set_velocity((), target)).call();
-    (|own: &mut Actuator<Motor>, target| own.set_angle((), target)).call();
-    family::<Actuator<Motor>>();
-    device::<Actuator<Motor>>();
+    actuator::<Motor>();
 }

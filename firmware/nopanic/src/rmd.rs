@@ -1,8 +1,8 @@
 //! Motors of MyActuator, in each control mode.
 
-use crate::functions::{device, family};
+use crate::functions::actuator;
 use crate::opaque::Function;
-use drivetrain::motor::{Actuator, AngleDrive, DriveProtocol, ImpedanceControl, VelocityDrive};
+use drivetrain::motor::ImpedanceControl;
 use drivetrain::rmd::*;
 
 pub fn call_all() {
@@ -30,15 +30,5 @@ fn motor() {
     Motor::reset_drive.call();
     Motor::feedback.call();
     Motor::state.call();
-    Motor::inquire.call();
-    Motor::decode_answer.call();
-    Motor::wrong_setting.call();
-    Motor::forget_settings.call();
-    Motor::poll.call();
-    Actuator::<Motor>::set_impedance.call();
-    Actuator::<Motor>::motor_mut.call();
-    (|own: &mut Actuator<Motor>, target| own.set_velocity((), target)).call();
-    (|own: &mut Actuator<Motor>, target| own.set_angle((), target)).call();
-    family::<Actuator<Motor>>();
-    device::<Actuator<Motor>>();
+    actuator::<Motor>();
 }

@@ -1,8 +1,8 @@
 //! Motors of RobStride, in each run mode.
 
-use crate::functions::{device, family};
+use crate::functions::actuator;
 use crate::opaque::Function;
-use drivetrain::motor::{Actuator, AngleDrive, DriveProtocol, ImpedanceControl, VelocityDrive};
+use drivetrain::motor::ImpedanceControl;
 use drivetrain::robstride::*;
 
 pub fn call_all() {
@@ -46,13 +46,5 @@ fn motor() {
     Motor::set_zero.call();
     Motor::set_id.call();
     Motor::register.call();
-    Motor::inquire.call();
-    Motor::decode_answer.call();
-    Motor::wrong_setting.call();
-    Motor::forget_settings.call();
-    Motor::poll.call();
-    (|own: &mut Actuator<Motor>, target| own.set_velocity((), target)).call();
-    (|own: &mut Actuator<Motor>, target| own.set_angle((), target)).call();
-    family::<Actuator<Motor>>();
-    device::<Actuator<Motor>>();
+    actuator::<Motor>();
 }

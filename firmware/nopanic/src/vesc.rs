@@ -1,8 +1,7 @@
 //! Motors on VESC drives, in each control mode.
 
-use crate::functions::{device, family};
+use crate::functions::actuator;
 use crate::opaque::Function;
-use drivetrain::motor::{Actuator, AngleDrive, DriveProtocol, VelocityDrive};
 use drivetrain::vesc::*;
 
 pub fn call_all() {
@@ -32,14 +31,5 @@ fn motor() {
     Motor::without_fault_code.call();
     Motor::feedback.call();
     Motor::position.call();
-    Motor::inquire.call();
-    Motor::decode_answer.call();
-    Motor::wrong_setting.call();
-    Motor::forget_settings.call();
-    Actuator::<Motor>::set_torque.call();
-    Actuator::<Motor>::motor_mut.call();
-    (|own: &mut Actuator<Motor>, target| own.set_velocity((), target)).call();
-    (|own: &mut Actuator<Motor>, target| own.set_angle((), target)).call();
-    family::<Actuator<Motor>>();
-    device::<Actuator<Motor>>();
+    actuator::<Motor>();
 }
