@@ -15,10 +15,10 @@ const SIMULATED: [&str; 6] =
 
 const MOST_OF_A_FAMILY: usize = 12;
 
-/// All others: 180, the goal, and 45 of later issues and users: referee system 3, super-capacitors 3, video link 2, abort of
-/// pending frames 2, speed loop of a wheel 1, impedance as a target 1, shooter 5, parameters 3, motion from any state 3, attitude 2, observer 1,
-/// state space 4, arms 2, a robot that balances 6, identification 4, the switch that arms 2, a broken rule with its frame 1.
-const MOST_OTHERS: usize = 180 + 45;
+/// All others: 182, where the goal was 180, and 43 of later issues and users: referee system 3, super-capacitors 3, video link 2, abort of
+/// pending frames 2, impedance as a target 1, shooter 5, parameters 3, motion from any state 3, attitude 2, observer 1,
+/// state space 4, arms 2, a robot that balances 6, identification 4, the switch that arms 2.
+const MOST_OTHERS: usize = 182 + 43;
 
 /// Types that each family has under the same name, written with the path of the family.
 const SKELETON: [&str; 11] = [
