@@ -1,4 +1,4 @@
-//! The same robot under a gimbal and a pilot: what each mode makes of the same stick, and what a power limit leaves.
+//! The same robot under a gimbal and a pilot: each mode moves by the same stick, and a power limit cuts the torques.
 
 use super::scenario::{
     FRONT_LEFT_M, Robot, WHEEL_RADIUS_M, Wheels, at, attach_motors, robot, seconds_of,
@@ -18,7 +18,7 @@ use std::error::Error;
 /// The stick is pushed to one side for this long, then to the next.
 const PUSH_S: f32 = 1.5;
 pub(crate) const ROTOR_RAD_S: f32 = 4.0;
-/// The referee's buffer, and what the robot keeps of it.
+/// The energy of the referee's buffer, and the reserve of the robot.
 pub(crate) const BUFFER_J: f32 = 60.0;
 const RESERVE_J: f32 = 20.0;
 /// V s/rad and Ω of an M3508, from its data sheet: where the fit starts, some of it wrong.
@@ -152,7 +152,7 @@ fn stick<F>(time_s: f32, seconds: f32) -> Twist<F> {
     }
 }
 
-/// The gimbal holds its direction in the world, whatever the chassis does, and looks to the left after a third.
+/// The gimbal holds its direction in the world while the chassis turns. After a third of the time, the gimbal turns to the left.
 fn gimbal(time_s: f32, seconds: f32) -> Angle {
     let turned = ((time_s - seconds / 3.0) / 0.5).clamp(0.0, 1.0);
     Angle::from_degrees(60.0 * turned)

@@ -26,7 +26,7 @@ const HELD_S: f32 = 0.25;
 const GRIPPER_DEG: f32 = 40.0;
 const GRIPPER_HZ: f32 = 0.25;
 
-/// What the operator does, and when.
+/// An action of the operator.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Action {
     /// Sends a reset for a while; the joints are to be straight.

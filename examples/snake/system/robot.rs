@@ -1,4 +1,4 @@
-//! The firmware: what would run on the microcontroller, at 1 kHz.
+//! The firmware of the microcontroller, at 1 kHz.
 
 use super::driver::Queued;
 use super::{JOINTS, seconds};

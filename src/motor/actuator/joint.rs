@@ -87,8 +87,8 @@ impl Joint {
         matches!(self.zero, Zero::Placed(_) | Zero::Found(_))
     }
 
-    /// Takes the angle of a frame of feedback, so long after the frame before, after a silence or not. A drive counts anew if the angle is further away than the shaft can
-    /// have turned. Returns by how much the drive counts further than before; `None` if the zero is lost.
+    /// Takes the angle of a frame of feedback, so long after the frame before, after a silence or not. A drive counts anew if the angle is
+    /// further away than the shaft can have turned. Returns by how much the drive counts further than before; `None` if the zero is lost.
     ///
     /// A jump by whole turns is no loss: some drives count within a turn.
     pub(super) fn follow(
@@ -166,7 +166,7 @@ impl Joint {
 
     /// Returns the shaft between the limits of the joint; `None` without a zero or an angle.
     pub(super) fn inside(&self, (lower, upper): (f32, f32), shaft: Shaft) -> Option<Inside> {
-        let zero = self.zero().filter(|_| self.has_limits())?.as_radians();
+        let zero = self.zero().filter(|_| self.depends_on_supply())?.as_radians();
         let (one, other) = (zero + self.sign * lower, zero + self.sign * upper);
         let here = shaft.0?.as_radians();
         // A velocity that is no number counts as none.

@@ -13,7 +13,7 @@ use embedded_hal::{digital, pwm};
 use std::string::ToString;
 use std::vec::Vec;
 
-/// What happened on the pins, in order, and the pin that is broken.
+/// The events of the pins in order, and the name of a broken pin.
 #[derive(Default)]
 struct Log {
     events: RefCell<Vec<(&'static str, u16)>>,
