@@ -25,6 +25,9 @@ macro_rules! passive {
         fn shaft(&self) -> &DriveShaft {
             self.0.shaft()
         }
+        fn shaft_mut(&mut self) -> &mut DriveShaft {
+            self.0.shaft_mut()
+        }
         fn lose_supply(&mut self) {
             self.0.lose_supply();
         }

@@ -69,7 +69,23 @@ fn a_joint_stops_at_its_limits_and_leaves_them_again() {
         }
         modes += 1;
     }
-    assert_eq!(modes, 22);
+    assert_eq!(modes, 24);
+}
+
+#[test]
+fn a_target_beyond_a_limit_holds_a_joint_for_a_minute_against_a_load() {
+    for (name, make) in stations().filter(|(name, _)| !follows_torques(name)) {
+        if name == "vesc, velocity" {
+            continue;
+        }
+        for (is_reversed, load_nm) in [(false, 0.1), (true, -0.1)] {
+            let mut station = at(make, &NARROW, is_reversed, 0.0);
+            drive(&mut station, 1.0, 3_000);
+            station.drive.shaft_mut().set_load(load_nm);
+            let (least, most) = drive(&mut station, 1.0, 60_000);
+            assert!(least > 0.85 && most < 1.06, "{name}, {is_reversed}: {least} to {most} rad");
+        }
+    }
 }
 
 #[test]

@@ -6,7 +6,7 @@ use drivetrain::control::PidConfig;
 use drivetrain::encoder::GearRatio;
 use drivetrain::error::ConfigError;
 use drivetrain::motor::{
-    Actuator, AngleDrive, DriveProtocol, ImpedanceControl, TargetError, VelocityDrive,
+    Actuator, AngleDrive, DriveProtocol, Impedance, ImpedanceControl, TargetError, VelocityDrive,
 };
 use drivetrain::sim::{DamiaoDrive, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive};
 use drivetrain::time::Duration;
@@ -47,6 +47,8 @@ pub(crate) const FAMILIES: [Family; 6] = [
         modes: &[
             ("MIT", || damiao_in(mit(3.0), 1.0, torque)),
             ("MIT, angle", || damiao_in(mit(3.0), 1.0, angle)),
+            ("MIT, velocity", || damiao_in(mit(3.0), 1.0, velocity)),
+            ("MIT, damper", || damiao_in(mit(3.0), 1.0, damper)),
             ("position-velocity", || {
                 damiao_in(damiao::Mode::position_velocity(quick()), 2.0, angle)
             }),
@@ -180,6 +182,12 @@ fn torque<M: DriveProtocol>(own: &mut Actuator<M>, share: f32) -> Result<(), Tar
 
 fn velocity<M: DriveProtocol>(own: &mut Actuator<M>, share: f32) -> Result<(), TargetError> {
     own.set_velocity((), AngularVelocity::from_rad_per_s(6.0 * share))
+}
+
+/// A velocity without a spring.
+fn damper<M: DriveProtocol>(own: &mut Actuator<M>, share: f32) -> Result<(), TargetError> {
+    let velocity = AngularVelocity::from_rad_per_s(6.0 * share);
+    own.set_impedance(Impedance { velocity, damping: 0.6, ..Impedance::FREE })
 }
 
 fn angle<M: DriveProtocol>(own: &mut Actuator<M>, share: f32) -> Result<(), TargetError> {

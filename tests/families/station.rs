@@ -118,6 +118,7 @@ pub(crate) trait Drive {
     }
     fn step(&mut self, dt_s: f32);
     fn shaft(&self) -> &DriveShaft;
+    fn shaft_mut(&mut self) -> &mut DriveShaft;
     fn lose_supply(&mut self);
     /// The drive fails, until its error is cleared.
     fn fail(&mut self);

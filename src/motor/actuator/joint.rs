@@ -212,6 +212,8 @@ const BRAKING_S: f32 = 0.1;
 /// At a limit, a torque brakes in proportion to the velocity up to half of this, in rad/s: at a lower one, the torque would
 /// change its sign with each step of a light joint.
 const SLOW: f32 = 4.0;
+/// An outward velocity beyond a limit leads back, at most so fast in rad/s.
+const BACK: f32 = 0.5;
 /// The way to a limit in rad over which an outward torque falls to zero.
 const FADING: f32 = 0.02;
 /// The longest way in rad to an angle, so that the shortest way leads in the same direction.
@@ -264,9 +266,12 @@ impl Inside {
     }
 
     fn velocity(&self, velocity: AngularVelocity) -> AngularVelocity {
-        let least = ((self.lower - self.here) / BRAKING_S).min(0.0);
-        let most = ((self.upper - self.here) / BRAKING_S).max(0.0);
-        AngularVelocity::from_rad_per_s(limited(velocity.as_rad_per_s(), least, most))
+        let wanted = velocity.as_rad_per_s();
+        // A target of zero moves no shaft.
+        let back = wanted.abs().min(BACK);
+        let least = ((self.lower - self.here) / BRAKING_S).min(back);
+        let most = ((self.upper - self.here) / BRAKING_S).max(-back);
+        AngularVelocity::from_rad_per_s(limited(wanted, least, most))
     }
 
     fn torque(&self, torque_nm: f32) -> f32 {
@@ -444,17 +449,19 @@ mod tests {
     }
 
     #[test]
-    fn an_outward_velocity_is_the_way_in_a_tenth_of_a_second_and_no_target_moves_the_shaft_by_itself()
-     {
+    fn an_outward_velocity_is_the_way_in_a_tenth_of_a_second_and_leads_back_slowly_from_beyond() {
         for (here, wanted, expected) in [
             (0.0, 5.0, 5.0),
             (1.9, 5.0, 1.0),
             (2.0, 5.0, 0.0),
-            (2.5, 5.0, 0.0),
+            (2.02, 5.0, -0.2),
+            (2.5, 5.0, -0.5),
+            (2.5, 0.1, -0.1),
             (2.5, -5.0, -5.0),
-            (-1.5, -5.0, 0.0),
+            (-1.5, -5.0, 0.5),
             (-0.9, -5.0, -1.0),
             (-1.5, 0.0, 0.0),
+            (2.5, 0.0, 0.0),
         ] {
             let target = Target::Velocity(AngularVelocity::from_rad_per_s(wanted));
             let Target::Velocity(sent) = inside(here, 0.0).target(target) else { panic!() };

@@ -126,8 +126,9 @@ impl HealthConfig {
     /// An [`Actuator`](crate::motor::Actuator) keeps each kind of target inside, and has the edge from 0.02 rad before a limit:
     ///
     /// * An angle is reached by the shortest way that stays inside; an angle outside is the limit next to it.
-    /// * An outward velocity is at most the distance to the limit divided by 0.1 s, and zero beyond. Nothing leads back: a load pulls the joint
-    ///   further out, and a drive whose command has no exact zero creeps, a J4310 by 0.01 rad/s. An angle as the target holds the joint.
+    /// * An outward velocity is at most the distance to the limit divided by 0.1 s. Beyond the limit it leads back in the same way, no faster
+    ///   than 0.5 rad/s and than the target. A velocity of zero stays zero: a load, or a drive whose command has no exact zero, moves the
+    ///   joint on, a J4310 by 0.01 rad/s. An angle as the target holds the joint.
     /// * An outward torque falls to zero over the last 0.02 rad, and from half of that velocity on; at a higher velocity it brakes, with at most
     ///   as much torque as the target has. So a small target stops a fast joint late, and a torque of zero never does.
     /// * Where the drive has no angle, beyond the range of its feedback, the motor rests.
