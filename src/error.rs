@@ -223,7 +223,7 @@ impl fmt::Display for ConfigError {
             Self::TooFewSamples(_) => ": fewer than 8 samples in half a period of the swing",
             Self::NoGain(_) => ": the swing is not larger than the hysteresis, or beyond f32",
             Self::NotStabilizable(_) => ": leaves a mode that no gain makes stable",
-            Self::Unsupported(_) => ": not available for this model or its firmware",
+            Self::Unsupported(_) => ": not available for this model, its mode or its firmware",
             Self::ReadOnly(_) => " is read only",
             _ => "",
         })

@@ -9,7 +9,8 @@ use embedded_can::Frame;
 /// A device family on a CAN bus: the interface between its motors and the transport of their frames.
 ///
 /// [`Devices`](super::Devices) is the side of the caller: a runner, an async task, a test. A type with this trait implements
-/// `Devices` by a line, `visitor.visit(self)`.
+/// `Devices` by a line, `visitor.visit(self)`. Both have calls of the same names, so a file imports one of the two: a program
+/// imports `Devices`, and the author of a device `CanDevice`.
 ///
 /// No method has a body here. A device with a missing method does not compile:
 /// ```compile_fail,E0046

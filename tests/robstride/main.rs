@@ -377,7 +377,7 @@ fn a_cybergear_is_never_told_to_store() {
     let refused = bench.own.motor_mut().store().unwrap_err();
     assert_eq!(
         refused.to_string(),
-        "frame to store parameters: not available for this model or its firmware"
+        "frame to store parameters: not available for this model, its mode or its firmware"
     );
     bench.steps(200, |bench| assert!(bench.frames.iter().all(|frame| kind(frame) != 22)));
     bench.own.arm(bench.now()).unwrap();
@@ -486,7 +486,7 @@ fn bad_configurations_are_refused_with_the_limit() {
     }
     let cybergear = Motor::new(Model::CYBERGEAR, 1, operation()).unwrap();
     let refused = cybergear.with_timeout(Duration::from_millis(50)).map(|_| ());
-    assert_eq!(text(refused), "time-out: not available for this model or its firmware");
+    assert_eq!(text(refused), "time-out: not available for this model, its mode or its firmware");
     let mut motor = motor;
     assert_eq!(
         text(motor.write(Register::SupplyVoltage, 10.0)),
