@@ -353,10 +353,48 @@ mod tests {
     fn copies_and_conversions_are_equal() {
         let data = CanFrame::standard(0x1FF, [1, 2, 3, 4, 5, 6, 7, 8]).unwrap();
         let remote = CanFrame::new_remote(ExtendedId::MAX, 3).unwrap();
-        for frame in [data, remote] {
+        let long = CanFrame::new_remote(ExtendedId::MAX, 8).unwrap();
+        for (frame, is_extended) in [(data, false), (remote, true), (long, true)] {
             assert_eq!(CanFrame::copy_of(&frame), Some(frame));
+            let mut copy = CanFrame::standard(0x123, [9; 8]).unwrap();
+            assert!(copy.copy_from(&frame));
+            assert_eq!((copy, copy.is_extended()), (frame, is_extended));
             assert_eq!(frame.convert::<CanFrame>(), Some(frame));
         }
+    }
+
+    /// A request of a driver that leaves the data of an older frame in its buffer.
+    struct Careless;
+
+    impl Frame for Careless {
+        fn new(_: impl Into<Id>, _: &[u8]) -> Option<Self> {
+            None
+        }
+        fn new_remote(_: impl Into<Id>, _: usize) -> Option<Self> {
+            Some(Self)
+        }
+        fn is_extended(&self) -> bool {
+            false
+        }
+        fn is_remote_frame(&self) -> bool {
+            true
+        }
+        fn id(&self) -> Id {
+            standard(0x201).into()
+        }
+        fn dlc(&self) -> usize {
+            8
+        }
+        fn data(&self) -> &[u8] {
+            &[1; 8]
+        }
+    }
+
+    #[test]
+    fn the_copy_of_a_request_has_no_data() {
+        let mut copy = CanFrame::standard(0x123, [9; 8]).unwrap();
+        assert!(copy.copy_from(&Careless));
+        assert_eq!(Some(copy), CanFrame::new_remote(standard(0x201), 8));
     }
 
     #[test]

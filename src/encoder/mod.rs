@@ -194,6 +194,48 @@ mod tests {
     }
 
     #[test]
+    fn laps_are_whole_ranges_and_grow_where_a_position_crosses_the_end() {
+        for (position, laps) in [
+            (0.0, 0),
+            (4.0, 0),
+            (-4.0, 0),
+            (4.5, 1),
+            (11.5, 1),
+            (12.5, 2),
+            (20.5, 3),
+            (-4.5, -1),
+            (-12.5, -2),
+        ] {
+            assert_eq!(Laps::of(position, 4.0).0, laps, "{position}");
+        }
+        let mut laps = Laps::default();
+        for (before, position, expected) in [
+            (None, 3.9, 0),
+            (Some(3.9), -3.9, 1),
+            (Some(-3.9), 0.0, 1),
+            (Some(0.0), 4.0, 1),
+            (Some(4.0), 0.0, 1),
+            (Some(0.0), -3.9, 1),
+            (Some(-3.9), 3.9, 0),
+            (Some(-3.9), 3.9, -1),
+        ] {
+            laps.advance(before, position, 4.0);
+            assert_eq!(
+                (laps.0, laps.is_none()),
+                (expected, expected == 0),
+                "{before:?}, {position}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_tachometer_gives_turns_and_the_angle_within_the_turn() {
+        let mut tachometer = Tachometer::new(40, 2);
+        tachometer.take(45); // of 20 a turn
+        assert_eq!(tachometer.position(), Position::new(2, Angle::from_turns(0.25)));
+    }
+
+    #[test]
     fn an_angle_that_contradicts_the_speed_is_flagged() {
         // 2 ms at 6000 rpm is 1638 counts; a quarter turn backward cannot be.
         assert!(resolve_gap((0, 6000), (6144, 6000), 2_000, 9256).is_err());

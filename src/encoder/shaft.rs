@@ -544,6 +544,12 @@ mod tests {
     }
 
     #[test]
+    fn a_dividend_with_no_lower_half_is_divided() {
+        let three = NonZeroU16::new(3).unwrap();
+        assert_eq!(divide(3 << 32, three), 1 << 32);
+    }
+
+    #[test]
     fn the_shortest_way_crosses_zero() {
         let mut shaft = shaft((1, 1), false);
         let degrees = |degrees| Position::from_angle(Angle::from_degrees(degrees));

@@ -76,3 +76,16 @@ impl<C: core::fmt::Display> core::fmt::Display for Edge<C> {
         write!(f, "{} {phase} at {} us", self.condition, self.at.as_micros())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::string::ToString;
+
+    #[test]
+    fn an_edge_reads_with_its_condition_and_time() {
+        let at = Instant::from_micros(7);
+        let edge = Edge { condition: "silence", began: false, at, source: () };
+        assert_eq!(edge.to_string(), "silence ended at 7 us");
+    }
+}

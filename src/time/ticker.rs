@@ -304,6 +304,19 @@ mod tests {
     }
 
     #[test]
+    fn a_step_that_is_late_by_a_period_leaves_one_out() {
+        let mut ticker = Ticker::new(Duration::from_millis(1));
+        assert!(ticker.due(at(0)).is_some());
+        assert_eq!(ticker.due(at(1_999)).map(Tick::dt_s), Some(0.001_999));
+        assert_eq!(
+            (ticker.overruns(), ticker.due(at(3_000)).map(Tick::dt_s)),
+            (0, Some(0.001_001))
+        );
+        assert_eq!((ticker.overruns(), ticker.due(at(3_999))), (1, None));
+        assert!(ticker.due(at(4_000)).is_some());
+    }
+
+    #[test]
     fn a_pause_of_days_is_one_step_and_a_saturated_count() {
         let mut ticker = Ticker::new(Duration::from_millis(1));
         assert!(ticker.due(at(0)).is_some());
@@ -332,6 +345,20 @@ mod tests {
             let step = TimeStep::new(1e30, dt_max_s);
             assert!(!step.is_hold() && !step.is_frozen() && step.dt_s() == 1e30, "{dt_max_s}");
         }
+    }
+
+    #[test]
+    fn a_step_of_no_time_and_an_input_that_is_no_number_are_counted_and_not_admitted() {
+        let (step, hold) = (TimeStep::new(0.25, 1.0), TimeStep::new(0.0, 1.0));
+        assert_eq!(TimeStep::usable(0.25, 1.0).map(|step| step.per_dt), Some(4.0));
+        assert!(TimeStep::usable(0.25, 0.0).is_none());
+        let mut rejected = u16::MAX - 2;
+        assert!(step.admits(true, &mut rejected));
+        assert_eq!(rejected, u16::MAX - 2);
+        assert!(!step.admits(false, &mut rejected) && !hold.admits(true, &mut rejected));
+        assert_eq!(rejected, u16::MAX);
+        assert!(!hold.admits(false, &mut rejected));
+        assert_eq!(rejected, u16::MAX);
     }
 
     #[test]
