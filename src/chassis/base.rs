@@ -1,8 +1,8 @@
-use super::drive::WheelDrive;
 use super::kinematics::{Fastest, slowed};
 use super::{ChassisLimits, ChassisStatus, DeadClock, Kinematics, Odometry, WheelSpeed};
 use crate::error::ConfigError;
 use crate::geometry::{Body, Heading, Pose2, Twist, World};
+use crate::motor::TargetError;
 use crate::time::Tick;
 use crate::units::Angle;
 
@@ -308,65 +308,28 @@ impl<K: Kinematics> Chassis<K> {
         }
     }
 
-    /// Reads the motors of all wheels, sets their targets, and returns the targets.
-    ///
-    /// `owner` is a [`VelocityDrive`](crate::motor::VelocityDrive): a bus, a motor of the application, or a tuple or array of
-    /// these; for swerve modules, an [`AngleDrive`](crate::motor::AngleDrive) too. The handle of a wheel is that of its motor, the
-    /// handle of a swerve module is [`ModuleMotors`](super::ModuleMotors). For motors on two buses, with a runner each, `owner` is the tuple of both buses
-    /// and a handle names its bus ([`OneOf`](crate::motor::OneOf)); each runner keeps its own `due` and `tick`.
-    ///
-    /// If a motor refuses its target, [`status`](Self::status) counts the refusal and keeps the first error; all other
-    /// wheels are driven, on the same device and on other devices. If all wheels of all devices refuse, the chassis starts
-    /// over: it discards the angles to hold, and when a motor takes its target again, the command is approached from the
-    /// measured motion. An application that stops a chassis with a lost wheel disarms its devices.
-    ///
-    /// Costs 1055 instructions on a Cortex-M4F, for four M3508 and mecanum wheels (`docs/figures.md`).
-    ///
-    /// # Examples
-    /// Front wheels on one bus, rear wheels on another:
-    /// ```
-    /// use drivetrain::chassis::{Chassis, Mecanum, MecanumWheels};
-    /// use drivetrain::control::PidConfig;
-    /// use drivetrain::dji::{Bus, Config, M3508};
-    /// use drivetrain::motor::{OneOf, TargetError};
-    /// use drivetrain::{geometry::{Twist, Vec2}, time::{Instant, Tick}};
-    ///
-    /// let (mut front, mut rear) = (Bus::new(), Bus::new());
-    /// let wheel = |id| Config::<M3508>::new(id).speed_loop(PidConfig::new(1.9, 2.4, 0.0));
-    /// let wheels = MecanumWheels {
-    ///     front_left: OneOf::First(front.attach(wheel(1))?),
-    ///     front_right: OneOf::First(front.attach(wheel(2).reversed())?),
-    ///     rear_left: OneOf::Second(rear.attach(wheel(1))?),
-    ///     rear_right: OneOf::Second(rear.attach(wheel(2).reversed())?),
-    /// };
-    /// let mut chassis = Chassis::new(Mecanum::new(0.1, Vec2::new(0.2, 0.2))?);
-    ///
-    /// // Each millisecond; with runners, `&mut (front.device_mut(), rear.device_mut())`:
-    /// chassis.set_body(Twist::new(1.0, 0.0, 0.0));
-    /// let targets = chassis.drive(&mut (&mut front, &mut rear), wheels, Tick::new(Instant::from_micros(1_000), 0.001));
-    /// assert!((targets.rear_left.as_rad_per_s() - 10.0).abs() < 1e-4);
-    /// assert_eq!(chassis.status().refused, 4);
-    /// assert_eq!(chassis.status().refusal, Some(TargetError::Disarmed));
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn drive<H: Copy, D: WheelDrive<H, K::Speed> + ?Sized>(
+    /// Reads the owner of the motors by `measured`, updates, and sets the targets by `command`.
+    pub(super) fn drive_by<O: ?Sized, H: Copy>(
         &mut self,
-        owner: &mut D,
+        owner: &mut O,
         wheels: K::Wheels<H>,
         tick: Tick,
+        measured: impl Fn(&O, H) -> Option<K::Speed>,
+        command: impl Fn(&mut O, H, K::Speed) -> Result<(), TargetError>,
     ) -> K::Wheels<K::Speed> {
-        let measured = K::map(wheels, |wheel| owner.measured(wheel));
+        let measured = K::map(wheels, |wheel| measured(owner, wheel));
         let targets = self.update(measured, tick);
         (self.status.refused, self.status.refusal) = (0, None);
         let (status, mut taken) = (&mut self.status, false);
-        let _: K::Wheels<()> =
-            K::map(K::zip(wheels, targets), |(wheel, target)| match owner.command(wheel, target) {
+        let _: K::Wheels<()> = K::map(K::zip(wheels, targets), |(wheel, target)| {
+            match command(owner, wheel, target) {
                 Ok(()) => taken = true,
                 Err(error) => {
                     status.refused = status.refused.saturating_add(1);
                     status.refusal = status.refusal.or(Some(error));
                 }
-            });
+            }
+        });
         if !taken {
             self.take_over();
         }

@@ -64,24 +64,26 @@ pub fn call_all() {
     (|chassis: &mut Chassis<Mecanum>,
       bus: &mut Bus,
       wheels: MecanumWheels<AnyHandle>,
-      tick: Tick| Chassis::drive(chassis, bus, wheels, tick))
+      tick: Tick| Chassis::<Mecanum>::drive(chassis, bus, wheels, tick))
     .call();
     (|chassis: &mut Chassis<Swerve<4>>,
       bus: &mut Bus,
       modules: [ModuleMotors<AnyHandle, AnyHandle>; 4],
-      tick: Tick| Chassis::drive(chassis, bus, modules, tick))
+      tick: Tick| Chassis::<Swerve<4>>::drive(chassis, bus, modules, tick))
     .call();
     (|chassis: &mut Chassis<Swerve<2>>,
       drives: &mut Bus,
       steerings: &mut Bus,
       modules: [ModuleMotors<OneOf<AnyHandle, AnyHandle>>; 2],
-      tick: Tick| Chassis::drive(chassis, &mut (drives, steerings), modules, tick))
+      tick: Tick| {
+        Chassis::<Swerve<2>>::drive(chassis, &mut (drives, steerings), modules, tick)
+    })
     .call();
     (|chassis: &mut Chassis<Mecanum>,
       front: &mut Bus,
       rear: &mut Bus,
       wheels: MecanumWheels<(usize, AnyHandle)>,
-      tick: Tick| Chassis::drive(chassis, &mut [front, rear], wheels, tick))
+      tick: Tick| Chassis::<Mecanum>::drive(chassis, &mut [front, rear], wheels, tick))
     .call();
     ModuleMotors::<AnyHandle, AnyHandle>::new.call();
     ChassisLimits::new.call();
