@@ -3,7 +3,6 @@
 #![cfg(test)]
 
 use drivetrain::dji::*;
-use drivetrain::encoder::{GearRatio, Shaft, shortest};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Ingest, MotorName};
 use drivetrain::time::{Duration, Instant, Tick};
@@ -257,14 +256,16 @@ fn sequences_unwrap_to_the_golden_counts() {
     assert_eq!(zeroed, numbers(&inverted["expect"]["unwrapped_after_zero"]));
 }
 
+/// The counts of a direct motor that reports these angles, one each millisecond.
 fn unwrap(samples: &[i64], reversed: bool) -> Vec<i64> {
-    let samples: Vec<u16> = samples.iter().map(|sample| u16::try_from(*sample).unwrap()).collect();
-    let mut shaft = Shaft::new(GearRatio::DIRECT, reversed);
-    shaft.seed(samples[0]);
-    let mut counts = vec![shaft.rotor_counts()];
-    for pair in samples.windows(2) {
-        shaft.advance(shortest(pair[0], pair[1]));
-        counts.push(shaft.rotor_counts());
-    }
-    counts
+    let mut bus = Bus::new();
+    let config = Config::<Gm6020Voltage>::new(1);
+    let motor = bus.attach(if reversed { config.reversed() } else { config }).unwrap();
+    let counts = (1..).zip(samples).map(|(ms, sample)| {
+        let [high, low] = u16::try_from(*sample).unwrap().to_be_bytes();
+        let frame = CanFrame::standard(0x205, [high, low, 0, 0, 0, 0, 0, 0]).unwrap();
+        assert_eq!(bus.ingest(&frame, Instant::from_micros(ms * 1_000)), Ingest::Taken);
+        bus.state(motor).unwrap().rotor_counts
+    });
+    counts.collect()
 }

@@ -1,7 +1,7 @@
 //! From a single-turn rotor angle to an exact multi-turn position of the output shaft.
 //!
 //! ```text
-//! 13-bit angle ──shortest / resolve──> rotor counts moved ──Shaft──> turns: i64 + phase of the output shaft
+//! 13-bit angle ──shortest / resolve_gap──> rotor counts moved ──> turns: i64 + phase of the output shaft
 //! ```
 //!
 //! | item | function |
@@ -9,7 +9,6 @@
 //! | [`shortest`] | the way from one angle to the next, when less than half a rotor turn passed |
 //! | [`resolve_gap`] | the same across lost frames, with the reported speeds; says when it cannot know |
 //! | [`GearRatio`] | an exact fraction, 3591:187 say |
-//! | [`Shaft`] | turns and phase of the output shaft, in integers, for any number of turns |
 //! | [`Position`] | a multi-turn position as users write it |
 //! | [`Homing`] | knowledge of the output shaft's absolute angle |
 //!
@@ -21,7 +20,8 @@ mod gear;
 mod shaft;
 
 pub use gear::{COUNTS_PER_TURN, GearRatio};
-pub use shaft::{Position, Shaft, shortest};
+pub(crate) use shaft::Shaft;
+pub use shaft::{Position, shortest};
 
 use crate::units::Angle;
 

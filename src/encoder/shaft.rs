@@ -26,25 +26,8 @@ pub const fn shortest(previous: u16, next: u16) -> i32 {
 ///
 /// The phase is counted in *fine counts*: rotor counts divided by the gear's output turns. For 3591:187 a rotor
 /// count is 187 fine counts and an output turn is 8192 * 3591 of them, so nothing is ever rounded.
-///
-/// # Examples
-/// ```
-/// use drivetrain::encoder::{GearRatio, Shaft};
-///
-/// let mut shaft = Shaft::new(GearRatio::new(36, 1)?, false);
-/// shaft.seed(8000);
-/// assert_eq!(shaft.rotor_counts(), 8000); // the first frame: absolute angle, no turn
-/// for _ in 0..36 {
-///     shaft.advance(4095);
-///     shaft.advance(4095);
-///     shaft.advance(2);
-/// }
-/// assert_eq!(shaft.rotor_counts(), 8000 + 36 * 8192);
-/// assert_eq!(shaft.position().turns(), 1); // 36 rotor turns are one output turn, exactly
-/// # Ok::<(), drivetrain::error::ConfigError>(())
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Shaft {
+pub(crate) struct Shaft {
     turns: Turns,
     phase: i32,
     radians_per_fine: f32,
@@ -85,7 +68,7 @@ impl Turns {
 impl Shaft {
     /// Takes the gear, and whether the rotor's positive direction is the shaft's negative direction.
     #[must_use]
-    pub const fn new(gear: GearRatio, reversed: bool) -> Self {
+    pub(crate) const fn new(gear: GearRatio, reversed: bool) -> Self {
         #[expect(clippy::cast_possible_wrap, reason = "a gear ratio has at most 8192 output turns")]
         let output = gear.output() as i16;
         Self {
@@ -107,14 +90,14 @@ impl Shaft {
 
     /// Returns whether the encoder sits on the output shaft: then its angle is known after any gap.
     #[must_use]
-    pub const fn is_direct(&self) -> bool {
+    pub(crate) const fn is_direct(&self) -> bool {
         self.rotor == 1 && self.fine_per_count.unsigned_abs().get() == 1
     }
 
     /// Starts from the first angle of the rotor: within the first turn, no turn counted.
     ///
     /// A reversed shaft sees the angle `8192 - rotor_angle`.
-    pub const fn seed(&mut self, rotor_angle: u16) {
+    pub(crate) const fn seed(&mut self, rotor_angle: u16) {
         self.set_zero();
         let angle = rotor_angle as i32 % COUNTS_PER_TURN as i32;
         let reversed = self.fine_per_count.is_negative() && angle != 0;
@@ -123,19 +106,19 @@ impl Shaft {
     }
 
     /// Makes the present position zero.
-    pub const fn set_zero(&mut self) {
+    pub(crate) const fn set_zero(&mut self) {
         self.turns = Turns::new(0);
         self.phase = 0;
     }
 
     /// Calls the present position `position`. A NaN or infinite angle counts as zero.
-    pub const fn set_position(&mut self, position: Position) {
+    pub(crate) const fn set_position(&mut self, position: Position) {
         (self.turns, self.phase) = self.locate(position);
     }
 
     /// Moves by rotor counts: at most half a rotor turn (-4096 to 4096), as [`shortest`] gives.
     #[inline(always)]
-    pub const fn advance(&mut self, counts: i32) {
+    pub(crate) const fn advance(&mut self, counts: i32) {
         let turn = self.fine_per_turn();
         let next = self.phase.wrapping_add(counts.wrapping_mul(self.fine_per_count.get() as i32));
         // One comparison for both ends: below zero is far above, unsigned.
@@ -154,7 +137,7 @@ impl Shaft {
     }
 
     /// Moves by any number of rotor counts: across a gap of many turns.
-    pub const fn advance_far(&mut self, counts: i32) {
+    pub(crate) const fn advance_far(&mut self, counts: i32) {
         const STEP: i32 = COUNTS_PER_TURN as i32 / 2;
         let mut rest = counts;
         while rest > STEP {
@@ -171,13 +154,13 @@ impl Shaft {
     /// Returns the position as turns and angle; the angle is rounded to `f32`.
     #[must_use]
     #[inline]
-    pub const fn position(&self) -> Position {
+    pub(crate) const fn position(&self) -> Position {
         Position { turns: self.turns.get(), angle: self.angle() }
     }
 
     /// Returns the angle within the turn: 0 up to, but not including, one turn.
     #[must_use]
-    pub const fn angle(&self) -> Angle {
+    pub(crate) const fn angle(&self) -> Angle {
         const BELOW_ONE_TURN: f32 = TAU.next_down();
         let radians = self.phase as f32 * self.radians_per_fine;
         Angle::from_radians(if radians < TAU { radians } else { BELOW_ONE_TURN })
@@ -187,7 +170,7 @@ impl Shaft {
     /// was set; exact. After a position other than zero was set, rounded to whole counts.
     #[must_use]
     #[inline]
-    pub const fn rotor_counts(&self) -> i64 {
+    pub(crate) const fn rotor_counts(&self) -> i64 {
         let fine = self
             .turns
             .get()
@@ -420,6 +403,17 @@ mod tests {
                 assert_eq!((shaft.position().turns(), shaft.rotor_counts()), (0, i64::from(angle)));
             }
         }
+    }
+
+    #[test]
+    fn thirty_six_rotor_turns_of_a_m2006_are_one_output_turn() {
+        let mut shaft = shaft(M2006, false);
+        shaft.seed(8000);
+        for _ in 0..36 {
+            [4095, 4095, 2].iter().for_each(|counts| shaft.advance(*counts));
+        }
+        assert_eq!(shaft.rotor_counts(), 8000 + 36 * 8192);
+        assert_eq!(shaft.position().turns(), 1);
     }
 
     #[test]

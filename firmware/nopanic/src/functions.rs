@@ -7,7 +7,7 @@ use drivetrain::dji::{
     AnyHandle, AttachError, Bus, Config, Facts, Feedback, Gm6020Current, Gm6020Voltage, Handle,
     M2006, M3508, WordGains,
 };
-use drivetrain::encoder::{GearRatio, Homing, Position, Shaft, resolve_gap, shortest};
+use drivetrain::encoder::{GearRatio, Homing, Position, resolve_gap, shortest};
 use drivetrain::error::ConfigError;
 use drivetrain::frame::CanFrame;
 use drivetrain::math::{atan2, sin_cos, sqrt, wrap, wrap_pi, wrap_positive, wrap_tau};
@@ -204,16 +204,6 @@ fn encoder() {
     GearRatio::rotor.call();
     GearRatio::output.call();
     GearRatio::as_f32.call();
-    Shaft::new.call();
-    Shaft::seed.call();
-    Shaft::set_zero.call();
-    Shaft::set_position.call();
-    Shaft::advance.call();
-    Shaft::advance_far.call();
-    Shaft::position.call();
-    Shaft::angle.call();
-    Shaft::is_direct.call();
-    Shaft::rotor_counts.call();
     Position::new.call();
     Position::from_turns.call();
     Position::from_angle.call();

@@ -9,7 +9,7 @@ use cortex_m_semihosting::hprintln;
 use drivetrain::chassis::{Mecanum, MecanumWheels};
 use drivetrain::control::{Pid, PidConfig};
 use drivetrain::dji::{Bus, Config, Feedback, Handle, M3508, State};
-use drivetrain::encoder::{Position, Shaft};
+use drivetrain::encoder::Position;
 use drivetrain::frame::CanFrame;
 use drivetrain::geometry::{
     Body, Gimbal, Point2, Point3, Rotation2, Rotation3, Transform2, Transform3, Twist, Vec2, Vec3,
@@ -362,6 +362,6 @@ pub fn sizes() {
     sizes!(
         "Bus" Bus, "Bus8" Bus<(), 8>, "Bus1" Bus<(), 1>, "Config" Config<M3508>, "Handle" Handle<M3508>, "State" State, "Feedback" Feedback,
         "Pid" Pid, "PidConfig" PidConfig,
-        "Shaft" Shaft, "Mecanum" Mecanum, "Transform2" Place2, "Transform3" Place3, "Position" Position, "CanFrame" CanFrame, "Instant" Instant, "Tick" Tick,
+        "Mecanum" Mecanum, "Transform2" Place2, "Transform3" Place3, "Position" Position, "CanFrame" CanFrame, "Instant" Instant, "Tick" Tick,
     );
 }
