@@ -191,8 +191,8 @@ fn position_actuator(mut input: Input) {
         actuator = actuator.and_then(|actuator| actuator.with_outer_divider(divider));
     }
     let Ok(fresh) = actuator else { return };
-    let range = fresh.cascade().speed().config().output_range();
-    let (slowest, fastest) = fresh.cascade().position().config().output_range();
+    let range = fresh.speed().config().output_range();
+    let (slowest, fastest) = fresh.position().config().output_range();
     let mut actuator = Observed::new(fresh);
     while !input.is_empty() {
         match input.byte() {

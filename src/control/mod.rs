@@ -7,7 +7,7 @@
 //! | speed, and the setpoint jumps | [`Pid`] | `with_tracking`; `with_incremental_form` where gains change on the way |
 //! | arm or lift position | [`PositionActuator`] | P over PI, the angle loop's output limit is the speed limit |
 //! | gimbal or swerve angle | [`PositionActuator`] | `with_period(360.0)`: the shortest way round |
-//! | the same, with an error from integers | [`Cascade`] | as the motors of a bus do |
+//! | the same, with an error from integers | [`PositionActuator::step_error`] | the measured speed is the rate |
 //! | heading of a chassis | [`Pid`] | PD with `with_period`, `with_dead_band` |
 //! | a target from a stick or another computer | [`SlewLimiter`], [`Differentiator::optimal`] | the acceleration the mechanism can take |
 //! | a move from A to B | [`Profile`] and [`Plant::effort`] | trapezoid; [`MotionLimits::with_jerk`] when it shakes |
@@ -58,7 +58,8 @@ mod shaping;
 pub mod state_space;
 mod tuning;
 
-pub use actuator::{Cascade, PositionActuator, SpeedActuator};
+pub(crate) use actuator::Cascade;
+pub use actuator::{PositionActuator, SpeedActuator};
 pub use differentiator::{Differentiator, fhan};
 pub use filter::{Biquad, LowPass, Window};
 pub use identification::{Excitation, Identification, IdentificationError, Plant};

@@ -133,7 +133,7 @@ impl Mode {
     /// Current control for velocities too, by a loop of ours from rad/s to Nm.
     ///
     /// # Errors
-    /// As [`Cascade::new`](crate::control::Cascade::new).
+    /// As [`Pid::new`](crate::control::Pid::new).
     pub fn current_with_speed_loop(speed: PidConfig) -> Result<Self, ConfigError> {
         let loops = TorqueLoops::new(PidConfig::new(0.0, 0.0, 0.0), speed)?;
         Ok(Self(Kind::Current(CurrentControl { loops: Some(loops), has_angle: false })))
@@ -143,7 +143,7 @@ impl Mode {
     /// six steps for an electrical turn, so a fine angle needs [`Motor::with_encoder`](super::Motor::with_encoder).
     ///
     /// # Errors
-    /// As [`Cascade::new`](crate::control::Cascade::new).
+    /// As [`Pid::new`](crate::control::Pid::new).
     pub fn current_with_loops(position: PidConfig, speed: PidConfig) -> Result<Self, ConfigError> {
         let loops = TorqueLoops::new(position, speed)?;
         Ok(Self(Kind::Current(CurrentControl { loops: Some(loops), has_angle: true })))

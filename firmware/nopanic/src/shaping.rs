@@ -5,15 +5,6 @@ use drivetrain::control::state_space::*;
 use drivetrain::control::*;
 
 pub fn call_all() {
-    Cascade::new.call();
-    Cascade::step.call();
-    Cascade::reset.call();
-    Cascade::interrupt.call();
-    Cascade::output.call();
-    Cascade::position.call();
-    Cascade::position_mut.call();
-    Cascade::speed.call();
-    Cascade::speed_mut.call();
     PositionActuator::with_angle_filter.call();
     PositionActuator::with_outer_divider.call();
     PositionActuator::new.call();
@@ -24,8 +15,10 @@ pub fn call_all() {
     PositionActuator::reset.call();
     PositionActuator::output.call();
     PositionActuator::speed_setpoint.call();
-    PositionActuator::cascade.call();
-    PositionActuator::cascade_mut.call();
+    PositionActuator::position.call();
+    PositionActuator::position_mut.call();
+    PositionActuator::speed.call();
+    PositionActuator::speed_mut.call();
     PositionActuator::rejected.call();
     SpeedActuator::with_feedback_filter.call();
     SpeedActuator::with_output_filter.call();

@@ -6,9 +6,9 @@ use crate::rows::swinging;
 use core::hint::black_box;
 use drivetrain::chassis::Odometry;
 use drivetrain::control::{
-    Biquad, Cascade, Differentiator, Identification, LoadObserver, LowPass, MotionLimits, Pid,
-    PidConfig, Plant, PositionActuator, Profile, ProfileState, RelayTuner, SlewLimiter,
-    SpeedActuator, StepResponse, Window,
+    Biquad, Differentiator, Identification, LoadObserver, LowPass, MotionLimits, Pid, PidConfig,
+    Plant, PositionActuator, Profile, ProfileState, RelayTuner, SlewLimiter, SpeedActuator,
+    StepResponse, Window,
 };
 use drivetrain::error::ConfigError;
 use drivetrain::geometry::{Body, Twist};
@@ -51,8 +51,10 @@ functions! {
 
 #[unsafe(no_mangle)]
 #[inline(never)]
-fn control_cascade(cascade: &mut Cascade, error: f32, velocity: f32, step: &TimeStep) -> f32 {
-    cascade.step(error, velocity, step)
+fn control_cascade(loops: &mut (Pid, Pid), error: f32, velocity: f32, step: &TimeStep) -> f32 {
+    let (speed, position) = loops;
+    let wanted = position.step_error(error, velocity, step);
+    speed.step(wanted, velocity, step)
 }
 
 #[unsafe(no_mangle)]
@@ -163,12 +165,13 @@ fn loops() {
             })],
         );
     }
-    let mut cascade = Cascade::new(black_box(pid), pid).unwrap();
+    let position = Pid::new(black_box(pid)).unwrap();
+    let mut cascade = (Pid::new(pid).unwrap(), position);
     let step = TimeStep::of(DT_S);
     row(
         "cascade",
         &[instructions(
-            control_cascade as fn(&mut Cascade, f32, f32, &TimeStep) -> f32,
+            control_cascade as fn(&mut (Pid, Pid), f32, f32, &TimeStep) -> f32,
             |update, call| {
                 update(&mut cascade, 0.5 - swinging(call), swinging(call + 1), &step);
             },

@@ -7,11 +7,12 @@
 //!                                                                     |
 //!                    speed -> low-pass ------------------------> PID -+-> low-pass -> output
 //! ```
-//! The two PIDs of the latter are a [`Cascade`], used without filters by the motors of a bus.
+//! The two PIDs of the latter are a `Cascade`, used without filters by an actuator.
 
 mod position;
 
-pub use position::{Cascade, PositionActuator};
+pub(crate) use position::Cascade;
+pub use position::PositionActuator;
 
 use super::filter::LowPass;
 use crate::control::pid::{Pid, PidConfig};

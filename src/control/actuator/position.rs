@@ -3,7 +3,7 @@ use crate::control::pid::{Pid, PidConfig};
 use crate::error::ConfigError;
 use crate::time::TimeStep;
 
-/// An angle loop over a speed loop, with their filters: a [`Cascade`] for floating-point angles.
+/// An angle loop over a speed loop, with their filters.
 ///
 /// ```text
 /// wanted = PID(setpoint, low-pass(angle)), every n-th step
@@ -182,15 +182,26 @@ impl PositionActuator {
         self.cascade.position().output()
     }
 
-    /// Returns the two loops, for their terms and their configurations.
+    /// Returns the position loop, for its terms and its configuration.
     #[must_use]
-    pub const fn cascade(&self) -> &Cascade {
-        &self.cascade
+    pub const fn position(&self) -> &Pid {
+        self.cascade.position()
     }
 
-    /// Returns the two loops, for changing their gains.
-    pub const fn cascade_mut(&mut self) -> &mut Cascade {
-        &mut self.cascade
+    /// Returns the position loop, for changing its gains.
+    pub const fn position_mut(&mut self) -> &mut Pid {
+        self.cascade.position_mut()
+    }
+
+    /// Returns the speed loop, for its terms and its configuration.
+    #[must_use]
+    pub const fn speed(&self) -> &Pid {
+        self.cascade.speed()
+    }
+
+    /// Returns the speed loop, for changing its gains.
+    pub const fn speed_mut(&mut self) -> &mut Pid {
+        self.cascade.speed_mut()
     }
 
     /// Returns the number of refused steps, and of steps too long to be integrated; stays at 65535.
@@ -247,30 +258,10 @@ impl PositionActuator {
 /// velocity ----------------------------------+
 /// ```
 /// Errors are formed elsewhere: from integers, or on a circle. The measured velocity is the rate of the position loop, so a
-/// positive `kd` damps, and its output limit is the speed limit. A [`PositionActuator`] is this with filters.
-///
-/// # Edge behaviour
-/// As the [`Pid`], loop by loop: on the first call, the position loop gives P and D, since the rate is given, and the speed
-/// loop P. If the error is NaN or infinite, the wanted velocity is held; if the velocity is NaN or infinite, or the step on
-/// hold, the output is held; each loop counts its refused inputs. A frozen step freezes the integral and D of both. After a
-/// bad velocity, the D of the speed loop rests in the next good step.
-///
-/// # Examples
-/// ```
-/// use drivetrain::control::{Cascade, PidConfig};
-/// use drivetrain::time::TimeStep;
-///
-/// // 10 rad/s per rad, at most 4 rad/s; 2 A per rad/s.
-/// let position = PidConfig::new(10.0, 0.0, 0.0).with_output_limit(4.0);
-/// let mut arm = Cascade::new(position, PidConfig::new(2.0, 0.0, 0.0))?;
-/// let step = TimeStep::of(0.001);
-/// assert_eq!(arm.step(1.0, 1.0, &step), 6.0); // 4 rad/s wanted, 1 rad/s measured
-/// assert_eq!(arm.speed_mut().step(1.5, 1.0, &step), 1.0); // the speed loop alone
-/// # Ok::<(), drivetrain::error::ConfigError>(())
-/// ```
+/// positive `kd` damps, and its output limit is the speed limit. Each input acts as on the two loops one after the other.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Cascade {
+pub(crate) struct Cascade {
     speed: Pid,
     position: Pid,
 }
@@ -280,7 +271,7 @@ impl Cascade {
     ///
     /// # Errors
     /// Names the parameter of a loop as [`Pid::new`] does.
-    pub const fn new(position: PidConfig, speed: PidConfig) -> Result<Self, ConfigError> {
+    pub(crate) const fn new(position: PidConfig, speed: PidConfig) -> Result<Self, ConfigError> {
         match (Pid::new(position), Pid::new(speed)) {
             (Ok(position), Ok(speed)) => Ok(Self { speed, position }),
             (Err(error), _) | (_, Err(error)) => Err(error),
@@ -292,22 +283,20 @@ impl Cascade {
     }
 
     /// Steps both loops and returns the output.
-    ///
-    /// Costs 64 instructions on a Cortex-M4F (`docs/figures.md`).
     #[inline]
-    pub fn step(&mut self, error: f32, velocity: f32, step: &TimeStep) -> f32 {
+    pub(crate) fn step(&mut self, error: f32, velocity: f32, step: &TimeStep) -> f32 {
         let wanted = self.position.step_error(error, velocity, step);
         self.speed.step(wanted, velocity, step)
     }
 
     /// Resets both loops: see [`Pid::reset`].
-    pub const fn reset(&mut self) {
+    pub(crate) const fn reset(&mut self) {
         self.position.reset();
         self.speed.reset();
     }
 
     /// Keeps the integrals of both loops over a gap in the measurements: see [`Pid::interrupt`].
-    pub const fn interrupt(&mut self) {
+    pub(crate) const fn interrupt(&mut self) {
         self.position.interrupt();
         self.speed.interrupt();
     }
@@ -315,33 +304,33 @@ impl Cascade {
     /// Returns the last output.
     #[must_use]
     #[inline]
-    pub const fn output(&self) -> f32 {
+    pub(crate) const fn output(&self) -> f32 {
         self.speed.output()
     }
 
     /// Returns the position loop, for its terms and its output.
     #[must_use]
     #[inline]
-    pub const fn position(&self) -> &Pid {
+    pub(crate) const fn position(&self) -> &Pid {
         &self.position
     }
 
     /// Returns the position loop: to step it alone, to change its gains, to take over from another controller.
     #[inline]
-    pub const fn position_mut(&mut self) -> &mut Pid {
+    pub(crate) const fn position_mut(&mut self) -> &mut Pid {
         &mut self.position
     }
 
     /// Returns the speed loop, for its terms and its output.
     #[must_use]
     #[inline]
-    pub const fn speed(&self) -> &Pid {
+    pub(crate) const fn speed(&self) -> &Pid {
         &self.speed
     }
 
     /// Returns the speed loop: to step it alone, to change its gains, to take over from another controller.
     #[inline]
-    pub const fn speed_mut(&mut self) -> &mut Pid {
+    pub(crate) const fn speed_mut(&mut self) -> &mut Pid {
         &mut self.speed
     }
 }
@@ -441,7 +430,7 @@ mod tests {
                 (angle, speed) = (angle + 10.0 * DT_S, speed + 10.0 * DT_S);
                 let bad = (100..150).contains(&sample);
                 actuator.step(0.0, if bad { f32::NAN } else { angle }, speed, &TimeStep::of(DT_S));
-                for pid in [actuator.cascade().position(), actuator.cascade().speed()] {
+                for pid in [actuator.position(), actuator.speed()] {
                     most = most.max(pid.terms().d.abs());
                 }
             }
@@ -508,15 +497,14 @@ mod tests {
             actuator.step(1.0, 0.0, 0.0, &TimeStep::of(DT_S));
         }
         let integrals = |actuator: &PositionActuator| {
-            (actuator.cascade().position().terms().i, actuator.cascade().speed().terms().i)
+            (actuator.position().terms().i, actuator.speed().terms().i)
         };
         let before = integrals(&actuator);
         assert!(before.0 > 0.0 && before.1 > 0.0);
         actuator.interrupt();
         actuator.step(1.0, 0.7, 0.4, &TimeStep::of(DT_S));
         assert_eq!(integrals(&actuator), before);
-        let (position, speed) =
-            (actuator.cascade().position().terms(), actuator.cascade().speed().terms());
+        let (position, speed) = (actuator.position().terms(), actuator.speed().terms());
         assert_eq!((position.d, speed.d), (0.0, 0.0));
         // The angle loop ran at once, and both filters let the values through.
         assert!(
@@ -551,7 +539,7 @@ mod tests {
         actuator.step_error(f32::NAN, 2.0, &TimeStep::of(DT_S));
         actuator.step_error(0.0, f32::NAN, &TimeStep::of(DT_S));
         actuator.step_error(0.0, 5.0, &TimeStep::of(DT_S));
-        assert_eq!(actuator.cascade().position().terms().d, -5.0); // and not that of two steps ago
+        assert_eq!(actuator.position().terms().d, -5.0); // and not that of two steps ago
         // By angles, the travel since the last good sample spans more than one step: D keeps its
         // value once.
         let mut actuator = config;
@@ -559,7 +547,7 @@ mod tests {
         actuator.step(0.0, 0.002, 0.0, &TimeStep::of(DT_S));
         actuator.step(0.0, f32::NAN, 0.0, &TimeStep::of(DT_S));
         actuator.step(0.0, 0.5, 0.0, &TimeStep::of(DT_S));
-        assert!((actuator.cascade().position().terms().d + 2.0).abs() < 1e-5);
+        assert!((actuator.position().terms().d + 2.0).abs() < 1e-5);
     }
 
     #[test]
@@ -579,9 +567,21 @@ mod tests {
     fn a_cascade_equals_one_loop_after_the_other() {
         let mut cascade = Cascade::new(POSITION, SPEED).unwrap();
         let (mut position, mut speed) = (Pid::new(POSITION).unwrap(), Pid::new(SPEED).unwrap());
+        let bad = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
         for sample in 0..50_u8 {
-            let (error, velocity) = (1.0 - 0.02 * f32::from(sample), 0.1 * f32::from(sample));
-            let step = TimeStep::of(if sample == 20 { 10.0 } else { 0.001 });
+            let (mut error, mut velocity) =
+                (1.0 - 0.02 * f32::from(sample), 0.1 * f32::from(sample));
+            match sample {
+                10..13 => error = bad[usize::from(sample) - 10],
+                30..33 => velocity = bad[usize::from(sample) - 30],
+                _ => {}
+            }
+            let step = TimeStep::of(match sample {
+                20 => 10.0,
+                40 => 0.0,
+                41 => f32::NAN,
+                _ => 0.001,
+            });
             let wanted = position.step_error(error, velocity, &step);
             let expected = speed.step(wanted, velocity, &step);
             assert_eq!(cascade.step(error, velocity, &step), expected);

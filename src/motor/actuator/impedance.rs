@@ -76,7 +76,7 @@ impl ImpedanceControl {
     /// do not apply then.
     ///
     /// # Errors
-    /// As [`Cascade::new`](crate::control::Cascade::new).
+    /// As [`Pid::new`](crate::control::Pid::new).
     pub fn with_loops(self, position: PidConfig, speed: PidConfig) -> Result<Self, ConfigError> {
         let limit = self.torque_limit_nm;
         let loops = TorqueLoops::new(position, speed.with_output_limit(limit))?;
@@ -283,13 +283,13 @@ enum Before {
 
 impl TorqueLoops {
     /// # Errors
-    /// As [`Cascade::new`].
+    /// As [`Pid::new`](crate::control::Pid::new).
     pub(crate) fn new(position: PidConfig, speed: PidConfig) -> Result<Self, ConfigError> {
         Ok(Self { loops: Cascade::new(position, speed)?, before: Before::Rest })
     }
 
     /// # Errors
-    /// As [`Cascade::new`]. Nothing is changed then.
+    /// As [`Pid::new`](crate::control::Pid::new). Nothing is changed then.
     pub(crate) fn set_config(
         &mut self,
         position: PidConfig,
