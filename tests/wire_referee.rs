@@ -9,7 +9,7 @@ use drivetrain::time::{Duration, Edge, Instant};
 use drivetrain::wire::dbus::Keys;
 use drivetrain::wire::referee::{MAX_FRAME, Referee, RefereeMessage, encode};
 use drivetrain::wire::supercap::{hkust, pacific_spirit};
-use drivetrain::wire::vt13::{DEAD_BAND, FRAME_LENGTH, ModeSwitch, VideoRemote};
+use drivetrain::wire::vt13::{DEAD_BAND, FRAME_LENGTH, VideoRemote};
 use drivetrain::wire::{Counts, Decode, Deframer, Receiver};
 use embedded_can::{Frame, StandardId};
 use proptest::prelude::*;
@@ -331,7 +331,7 @@ fn vt13_frames() {
     for (value, raw) in channels.into_iter().zip(raw) {
         assert!((value - (float(raw) - 1024.0) / 660.0).abs() < 1e-6, "{value} {raw}");
     }
-    assert_eq!(shown.mode, ModeSwitch::S);
+    assert_eq!(shown.mode, VideoRemote::S);
     let switches = [
         (shown.pause, "pause"),
         (shown.button_left, "fn_1"),
@@ -350,7 +350,7 @@ fn vt13_frames() {
     assert_eq!(expect["keys"], "0x8001");
 
     let (rest, _) = remote("vt03.center");
-    assert_eq!(rest[0].mode, ModeSwitch::N);
+    assert_eq!(rest[0].mode, VideoRemote::N);
     let channels = [rest[0].right_x, rest[0].right_y, rest[0].left_y, rest[0].left_x, rest[0].dial];
     assert_eq!(channels.map(f32::to_bits), [0; 5]);
 }

@@ -21,7 +21,7 @@
 //! ```
 //! use drivetrain::time::{Duration, Instant};
 //! use drivetrain::wire::dbus::Keys;
-//! use drivetrain::wire::vt13::{DEAD_BAND, FRAME_LENGTH, ModeSwitch, VideoRemote};
+//! use drivetrain::wire::vt13::{DEAD_BAND, FRAME_LENGTH, VideoRemote};
 //! use drivetrain::wire::Receiver;
 //!
 //! let ms = |ms| Instant::START + Duration::from_millis(ms);
@@ -32,7 +32,7 @@
 //! ];
 //! while let Some(shown) = remote.read(&mut received, ms(0)) {
 //!     assert_eq!((shown.right_x, shown.right_y, shown.left_y, shown.left_x), (1.0, -1.0, 0.0, 1.0));
-//!     assert_eq!(shown.mode, ModeSwitch::S);
+//!     assert_eq!(shown.mode.is_at(VideoRemote::S), Some(true));
 //!     assert!(shown.keys.contains(Keys::W) && shown.pause);
 //! }
 //! assert!(remote.latest(ms(100)).is_some());
@@ -45,7 +45,7 @@
 //! its order otherwise, and one leaves key C out. **Not known:** a captured frame (the vectors are computed), and the rate of the
 //! frames: the drivers use a time-out of 100 ms, one of 500 ms.
 
-use super::dbus::{Keys, field, scaled};
+use super::dbus::{Keys, Switch, field, scaled};
 use super::{Decode, Reader, Reject, referee};
 
 /// The length of a frame in bytes.
@@ -69,8 +69,8 @@ pub struct VideoRemote {
     pub left_y: f32,
     /// The dial, -1 to 1. The sources do not state the positive direction.
     pub dial: f32,
-    /// The mode switch.
-    pub mode: ModeSwitch,
+    /// The mode switch: [`C`](Self::C), [`N`](Self::N) or [`S`](Self::S), the letters printed beside it.
+    pub mode: Switch,
     /// Whether the pause button is down.
     pub pause: bool,
     /// Whether the left of the two buttons to be assigned is down (`fn_1`).
@@ -95,20 +95,14 @@ pub struct VideoRemote {
     pub keys: Keys,
 }
 
-/// The position of the mode switch, by the letters printed beside it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum ModeSwitch {
-    /// C.
-    C,
-    /// N, in the middle.
-    N,
-    /// S.
-    S,
-}
-
 impl VideoRemote {
+    /// The mode switch at C, at one end.
+    pub const C: Switch = Switch::Up;
+    /// The mode switch at N, in the middle.
+    pub const N: Switch = Switch::Middle;
+    /// The mode switch at S, at the other end.
+    pub const S: Switch = Switch::Down;
+
     fn read(mut fields: Reader<'_>, dead_band: u16) -> Option<Self> {
         let _header: [u8; 2] = fields.take()?;
         let bits = u64::from_le_bytes(fields.take()?);
@@ -123,9 +117,9 @@ impl VideoRemote {
             left_x: channel(33)?,
             dial: channel(49)?,
             mode: match field(bits, 44, 3) {
-                0 => ModeSwitch::C,
-                1 => ModeSwitch::N,
-                2 => ModeSwitch::S,
+                0 => Self::C,
+                1 => Self::N,
+                2 => Self::S,
                 _ => return None,
             },
             pause: button(46),
