@@ -9,7 +9,7 @@ use drivetrain::control::{Pid, PidConfig};
 use drivetrain::dji::{Bus, Config, M3508};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Actuator, Claim, DriveProtocol, Ingest, MotorName, Order};
-use drivetrain::motor::{Role, Target, Vitals};
+use drivetrain::motor::{Target, Vitals};
 use drivetrain::units::AngularVelocity;
 use embedded_can::{Frame, Id, StandardId};
 
@@ -45,8 +45,8 @@ impl DriveProtocol for MyMotor {
     }
 
     fn claims(&self) -> impl IntoIterator<Item = Claim> {
-        let claim = |base, role| Claim::new(standard(base + u16::from(self.id)), role, self.name());
-        [claim(0x120, Role::Command), claim(0x140, Role::Feedback)]
+        let id = |base| standard(base + u16::from(self.id));
+        [Claim::command(id(0x120), self.name()), Claim::feedback(id(0x140), self.name())]
     }
 
     fn decode(&mut self, frame: &CanFrame) -> Ingest {
@@ -203,8 +203,8 @@ mod simulation {
         }
         fn claims(&self) -> impl IntoIterator<Item = Claim> {
             let id = u16::from(self.0.id);
-            let command = Claim::new(standard(0x200 + id), Role::Command, self.name());
-            [command, Claim::new(standard(0x010 + id), Role::Feedback, self.name())]
+            let command = Claim::command(standard(0x200 + id), self.name());
+            [command, Claim::feedback(standard(0x010 + id), self.name())]
         }
         fn decode(&mut self, frame: &CanFrame) -> Ingest {
             self.0.decode(frame)
@@ -234,7 +234,7 @@ mod simulation {
         match robot.arm(Instant::START) {
             Err(ArmError::Clash(one, other)) => {
                 console::line(format_args!("refused: {one} clashes with {other}"));
-                let clash = [&one, &other].map(Claim::role) == [Role::Feedback, Role::Command];
+                let clash = [&one, &other].map(Claim::is_feedback) == [true, false];
                 if clash { Ok(()) } else { Err("the wrong clash".into()) }
             }
             outcome => Err(format!("expected a clash, got {outcome:?}").into()),

@@ -6,7 +6,7 @@
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
     Actuator, AngleDrive, ArmError, Capabilities, Capability, Claim, Condition, DriveProtocol,
-    Ingest, MotorName, Order, Role, Target, TargetError, VelocityDrive, WrongSetting,
+    Ingest, MotorName, Order, Target, TargetError, VelocityDrive, WrongSetting,
 };
 use drivetrain::motor::{Devices, HealthConfig, Vitals};
 use drivetrain::time::{Duration, Instant, Tick};
@@ -64,9 +64,9 @@ impl DriveProtocol for Tool {
         MotorName::new("tool", 1)
     }
     fn claims(&self) -> impl IntoIterator<Item = Claim> {
-        let claim = |raw, role| Claim::new(id(raw), role, self.name());
-        let commands = (0x301..=0x304).map(move |raw| claim(raw, Role::Command));
-        commands.chain([0x381, 0x382].map(|raw| claim(raw, Role::Feedback)))
+        let name = self.name();
+        let commands = (0x301..=0x304).map(move |raw| Claim::command(id(raw), name));
+        commands.chain([0x381, 0x382].map(|raw| Claim::feedback(id(raw), name)))
     }
     fn decode(&mut self, frame: &CanFrame) -> Ingest {
         match (frame.id() == id(0x381), frame.data()) {
@@ -788,7 +788,7 @@ fn a_second_master_is_named_by_the_command_that_it_sent() {
         let rival = CanFrame::of(id(raw), [1]);
         assert_eq!(bench.own.ingest(&rival, now), Ingest::Unrelated);
         let Err(ArmError::SecondMaster(claim)) = bench.own.arm(now) else { panic!("{raw:X}") };
-        assert_eq!((claim.id(), claim.role()), (id(raw), Role::Command));
+        assert_eq!((claim.id(), claim.is_feedback()), (id(raw), false));
     }
 }
 
@@ -800,13 +800,10 @@ impl DriveProtocol for WideId {
         MotorName::new("wide", 1)
     }
     fn claims(&self) -> impl IntoIterator<Item = Claim> {
-        let claim = |raw, role| {
-            let id = ExtendedId::new(raw).unwrap();
-            Claim::new(id, role, self.name())
-        };
+        let id = |raw| ExtendedId::new(raw).unwrap();
         [
-            claim(0x0100_0001, Role::Command).with_mask(0x1F00_00FF),
-            claim(0x0200_01FD, Role::Feedback).with_mask(0x1F00_FFFF),
+            Claim::command(id(0x0100_0001), self.name()).with_mask(0x1F00_00FF),
+            Claim::feedback(id(0x0200_01FD), self.name()).with_mask(0x1F00_FFFF),
         ]
     }
     fn decode(&mut self, _: &CanFrame) -> Ingest {

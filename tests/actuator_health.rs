@@ -5,7 +5,7 @@
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
     Actuator, ArmError, Claim, Condition, Devices, DriveProtocol, HealthConfig, Ingest, MotorName,
-    Order, Reaction, Role, TargetError, VelocityDrive, Vitals,
+    Order, Reaction, TargetError, VelocityDrive, Vitals,
 };
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::AngularVelocity;
@@ -32,8 +32,7 @@ impl DriveProtocol for Talker {
         MotorName::new("talker", 1)
     }
     fn claims(&self) -> impl IntoIterator<Item = Claim> {
-        let claim = |raw, role| Claim::new(id(raw), role, self.name());
-        [claim(0x123, Role::Command), claim(0x124, Role::Feedback)]
+        [Claim::command(id(0x123), self.name()), Claim::feedback(id(0x124), self.name())]
     }
     fn decode(&mut self, frame: &CanFrame) -> Ingest {
         let [celsius, code, effort, speed] = *frame.data() else {

@@ -6,7 +6,7 @@
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
     Actuator, AngleDrive, Capabilities, Capability, Claim, Condition, Devices, DriveProtocol,
-    HealthConfig, Ingest, MotorName, Order, Role, Target, TargetError, Timeouts,
+    HealthConfig, Ingest, MotorName, Order, Target, TargetError, Timeouts,
 };
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
@@ -31,8 +31,8 @@ impl DriveProtocol for Plain {
     }
 
     fn claims(&self) -> impl IntoIterator<Item = Claim> {
-        [(0x123, Role::Command), (0x124, Role::Feedback)]
-            .map(|(raw, role)| Claim::new(id(raw), role, MotorName::new("plain", 1)))
+        let name = MotorName::new("plain", 1);
+        [Claim::command(id(0x123), name), Claim::feedback(id(0x124), name)]
     }
 
     fn decode(&mut self, frame: &CanFrame) -> Ingest {

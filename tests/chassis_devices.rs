@@ -10,8 +10,7 @@ use drivetrain::frame::CanFrame;
 use drivetrain::geometry::{Heading, Twist, Vec2};
 use drivetrain::motor::{
     Actuator, AngleDrive, Capabilities, Capability, Claim, Condition, Devices, DriveProtocol,
-    HealthConfig, Ingest, MotorName, OneOf, Order, Reaction, Role, Target, TargetError,
-    VelocityDrive,
+    HealthConfig, Ingest, MotorName, OneOf, Order, Reaction, Target, TargetError, VelocityDrive,
 };
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{Controller, Fault, Line, MotorConfig, Simulation};
@@ -316,8 +315,8 @@ impl DriveProtocol for Hub {
     fn claims(&self) -> impl IntoIterator<Item = Claim> {
         let id = u16::from(self.id);
         [
-            Claim::new(standard(0x300 + id), Role::Command, self.name()),
-            Claim::new(standard(0x320 + id), Role::Feedback, self.name()),
+            Claim::command(standard(0x300 + id), self.name()),
+            Claim::feedback(standard(0x320 + id), self.name()),
         ]
     }
 

@@ -7,7 +7,7 @@ use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Current, M3508};
 use drivetrain::error::ConfigError;
 use drivetrain::geometry::Vec2;
-use drivetrain::motor::{Claim, MotorName, Role};
+use drivetrain::motor::{Claim, MotorName};
 use drivetrain::runner::FrameQueue;
 use drivetrain::time::ExtendedCounter;
 use embedded_can::StandardId;
@@ -77,8 +77,8 @@ fn handles_show_model_and_slot_and_are_equal_to_themselves() {
 #[test]
 fn claims_and_counters_say_who_and_what() {
     let id = StandardId::new(0x123).unwrap();
-    let claim = Claim::new(id, Role::Command, MotorName::new("pump", 4));
-    assert_eq!((claim.role(), claim.motor().id()), (Role::Command, 4));
+    let claim = Claim::command(id, MotorName::new("pump", 4));
+    assert_eq!((claim.is_feedback(), claim.motor().id()), (false, 4));
     says(&claim, &["pump", "4", "123"]);
     says(&ExtendedCounter::new_16_bit(999_983).unwrap_err(), &["999983 Hz", "rounder frequency"]);
 }

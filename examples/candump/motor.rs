@@ -5,7 +5,7 @@ use drivetrain::dji::{self, AnyHandle, Bus, Config, Gm6020Current, Gm6020Voltage
 use drivetrain::encoder::{GearRatio, Position};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    Actuator, CanDevice, Claim, DriveProtocol, ImpedanceControl, Ingest, MotorName, Role,
+    Actuator, CanDevice, Claim, DriveProtocol, ImpedanceControl, Ingest, MotorName,
 };
 use drivetrain::time::Instant;
 use drivetrain::units::AngularVelocity;
@@ -76,7 +76,7 @@ impl Listener for Dji {
     }
 
     fn feedback(&self) -> Vec<Claim> {
-        CanDevice::claims(&self.bus).filter(|claim| claim.role() == Role::Feedback).collect()
+        CanDevice::claims(&self.bus).filter(|claim| claim.is_feedback()).collect()
     }
 }
 
@@ -104,7 +104,7 @@ impl<M: DriveProtocol> Listener for Actuator<M> {
     }
 
     fn feedback(&self) -> Vec<Claim> {
-        CanDevice::claims(self).filter(|claim| claim.role() == Role::Feedback).collect()
+        CanDevice::claims(self).filter(|claim| claim.is_feedback()).collect()
     }
 }
 
@@ -196,7 +196,7 @@ impl Listener for Lk {
 
     fn feedback(&self) -> Vec<Claim> {
         let id = StandardId::new(0x140 + u16::from(self.id)).unwrap_or(StandardId::MAX);
-        vec![Claim::new(id, Role::Feedback, self.name())]
+        vec![Claim::feedback(id, self.name())]
     }
 }
 

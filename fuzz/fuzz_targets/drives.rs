@@ -7,7 +7,7 @@ use drivetrain::encoder::GearRatio;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
     Actuator, AngleDrive, CanDevice, Devices, DriveProtocol, Impedance, ImpedanceControl, Ingest,
-    Role, VelocityDrive,
+    VelocityDrive,
 };
 use drivetrain::sim::{DamiaoDrive, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive};
 use drivetrain::time::{Duration, Instant, Tick};
@@ -440,7 +440,7 @@ impl<M: DriveProtocol + Copy + Debug, D: Drive> Bench<M, D> {
             let Some(frame) = Devices::next_frame(&mut self.own, turn) else { break };
             assert!(turn < 2, "more than two frames in an update: {frame:?}");
             let is_claimed = CanDevice::claims(&self.own)
-                .any(|claim| claim.role() == Role::Command && claim.covers(frame.id()));
+                .any(|claim| !claim.is_feedback() && claim.covers(frame.id()));
             assert!(is_claimed || frame.is_remote_frame(), "{frame:?}");
             if refused & 0x10 << turn != 0 {
                 assert!(Devices::put_back(&mut self.own, &frame), "{frame:?}");

@@ -9,7 +9,7 @@ use crate::frame::{CanFrame, standard_id};
 use crate::motor::Impedance;
 use crate::motor::{
     Capabilities, Capability, Claim, DriveProtocol, Ingest, Inquiry, MotorName, Order, Preparation,
-    Role, Settings, TimeoutUnits, Vitals, WrongSetting, register_questions,
+    Settings, TimeoutUnits, Vitals, WrongSetting, register_questions,
 };
 use crate::time::Duration;
 use crate::units::{Angle, AngularVelocity};
@@ -151,13 +151,11 @@ impl DriveProtocol for Motor {
 
     /// All drives of the family share the id of the registers.
     fn claims(&self) -> impl IntoIterator<Item = Claim> {
-        let claim = |id, role| Claim::new(standard_id(id), role, self.name());
-        let bare = (self.mode.base() > 0).then(|| claim(self.id.into(), Role::Command));
-        let shared = [
-            claim(REGISTERS, Role::Command).shared(),
-            claim(self.master_id, Role::Feedback).shared(),
-        ];
-        [claim(self.command_id(), Role::Command)].into_iter().chain(bare).chain(shared)
+        let command = |id| Claim::command(standard_id(id), self.name());
+        let bare = (self.mode.base() > 0).then(|| command(self.id.into()));
+        let feedback = Claim::feedback(standard_id(self.master_id), self.name());
+        let shared = [command(REGISTERS).shared(), feedback.shared()];
+        [command(self.command_id())].into_iter().chain(bare).chain(shared)
     }
 
     fn decode(&mut self, frame: &CanFrame) -> Ingest {

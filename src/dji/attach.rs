@@ -6,7 +6,7 @@ use super::outbox::{Outbox, Place};
 use super::slot::config::configured;
 use super::slot::{Key, Slot, health};
 use super::{AttachError, Facts};
-use crate::motor::{ArmError, BusLoad, Claim, Condition, MotorName, Obstacles, Role};
+use crate::motor::{ArmError, BusLoad, Claim, Condition, MotorName, Obstacles};
 use crate::time::Instant;
 use core::ops::Range;
 use embedded_can::StandardId;
@@ -161,11 +161,7 @@ pub(super) fn is_armed(slots: &[Slot]) -> bool {
 /// Returns a command of one of these motors that another node has sent.
 pub(super) fn rival_among<'a>(mut slots: impl Iterator<Item = &'a Slot>) -> Option<Claim> {
     let slot = slots.find(|slot| slot.guard.latch().has(Condition::SecondMaster))?;
-    claim(slot.place.frame().id(), Role::Command, slot.name()?)
-}
-
-pub(super) fn claim(id: u16, role: Role, motor: MotorName) -> Option<Claim> {
-    Some(Claim::new(StandardId::new(id)?, role, motor))
+    Some(Claim::command(StandardId::new(slot.place.frame().id())?, slot.name()?))
 }
 
 /// Rates for the computation of the load.

@@ -9,7 +9,7 @@ use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::{
     Capabilities, Capability, Claim, DriveProtocol, Goal, Ingest, MotorName, Order, Questions,
-    Role, Vitals, WrongSetting,
+    Vitals, WrongSetting,
 };
 use crate::units::{Angle, AngularVelocity};
 
@@ -170,8 +170,8 @@ impl DriveProtocol for Motor {
     }
 
     fn claims(&self) -> impl IntoIterator<Item = Claim> {
-        let claim = |role| Claim::new(id_of(FRAMES, self.id), role, self.name());
-        [claim(Role::Command), claim(Role::Feedback)]
+        let id = id_of(FRAMES, self.id);
+        [Claim::command(id, self.name()), Claim::feedback(id, self.name())]
     }
 
     fn decode(&mut self, frame: &CanFrame) -> Ingest {

@@ -3,27 +3,17 @@
 use crate::frame::CanFrame;
 use embedded_can::Id;
 
-/// Sender of the frames of a claimed id.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Role {
-    /// The controller.
-    Command,
-    /// The motor.
-    Feedback,
-}
-
 /// A CAN id, or a block of ids under a mask, of one motor.
 ///
 /// # Examples
 /// ```
-/// use drivetrain::motor::{Claim, MotorName, Role};
+/// use drivetrain::motor::{Claim, MotorName};
 /// use embedded_can::StandardId;
 ///
 /// let id = |raw| StandardId::new(raw).unwrap_or(StandardId::ZERO);
-/// let dji = Claim::new(id(0x201), Role::Feedback, MotorName::new("M3508", 1));
-/// let damiao = Claim::new(id(0x201), Role::Command, MotorName::new("DM4310 (velocity)", 1));
-/// let odrive = Claim::new(id(0x200), Role::Command, MotorName::new("ODrive", 0x10)).with_mask(0x7E0);
+/// let dji = Claim::feedback(id(0x201), MotorName::new("M3508", 1));
+/// let damiao = Claim::command(id(0x201), MotorName::new("DM4310 (velocity)", 1));
+/// let odrive = Claim::command(id(0x200), MotorName::new("ODrive", 0x10)).with_mask(0x7E0);
 /// assert!(dji.clashes_with(&damiao));
 /// assert!(dji.clashes_with(&odrive)); // node 0x10 owns 0x200 to 0x21F
 /// ```
@@ -31,16 +21,22 @@ pub enum Role {
 pub struct Claim {
     id: Id,
     mask: u32,
-    role: Role,
+    is_feedback: bool,
     is_shared: bool,
     motor: MotorName,
 }
 
 impl Claim {
-    /// Claims one id.
+    /// Claims one id for frames of the controller.
     #[must_use]
-    pub fn new(id: impl Into<Id>, role: Role, motor: MotorName) -> Self {
-        Self { id: id.into(), mask: u32::MAX, role, is_shared: false, motor }
+    pub fn command(id: impl Into<Id>, motor: MotorName) -> Self {
+        Self { id: id.into(), mask: u32::MAX, is_feedback: false, is_shared: false, motor }
+    }
+
+    /// Claims one id for frames of the motor.
+    #[must_use]
+    pub fn feedback(id: impl Into<Id>, motor: MotorName) -> Self {
+        Self { is_feedback: true, ..Self::command(id, motor) }
     }
 
     /// Claims every id with an equal value under `mask`.
@@ -55,15 +51,16 @@ impl Claim {
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::motor::{Claim, MotorName, Role};
+    /// use drivetrain::motor::{Claim, MotorName};
     /// use embedded_can::StandardId;
     ///
     /// // Damiao drives that all answer to one master id, each with its own number in the first byte.
-    /// let answer = |id, role| Claim::new(StandardId::ZERO, role, MotorName::new("DM-J4310", id));
-    /// let (first, second) = (answer(1, Role::Feedback), answer(2, Role::Feedback));
+    /// let answer = |id| Claim::feedback(StandardId::ZERO, MotorName::new("DM-J4310", id));
+    /// let (first, second) = (answer(1), answer(2));
     /// assert!(first.clashes_with(&second) && first.shared().clashes_with(&second));
     /// assert!(!first.shared().clashes_with(&second.shared()));
-    /// assert!(first.shared().clashes_with(&answer(2, Role::Command).shared()));
+    /// let command = Claim::command(StandardId::ZERO, second.motor());
+    /// assert!(first.shared().clashes_with(&command.shared()));
     /// ```
     #[must_use]
     pub const fn shared(self) -> Self {
@@ -74,12 +71,12 @@ impl Claim {
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::motor::{Claim, MotorName, Role};
+    /// use drivetrain::motor::{Claim, MotorName};
     /// use embedded_can::{ExtendedId, StandardId};
     ///
     /// // A CyberGear answers with its state within the id: type 2, motor 0x7F, host 0xFD.
     /// let id = |raw| ExtendedId::new(raw).unwrap_or(ExtendedId::ZERO);
-    /// let answer = Claim::new(id(0x0200_7FFD), Role::Feedback, MotorName::new("CyberGear", 127))
+    /// let answer = Claim::feedback(id(0x0200_7FFD), MotorName::new("CyberGear", 127))
     ///     .with_mask(0x1F00_FFFF);
     /// assert!(answer.covers(id(0x0280_7FFD)) && !answer.covers(id(0x0280_7EFD)));
     /// assert!(!answer.covers(StandardId::ZERO));
@@ -95,10 +92,10 @@ impl Claim {
     #[must_use]
     pub fn clashes_with(&self, other: &Self) -> bool {
         let is_shared = self.is_shared || other.is_shared;
-        if self.motor == other.motor && self.role != other.role && !is_shared {
+        if self.motor == other.motor && self.is_feedback != other.is_feedback && !is_shared {
             return false;
         }
-        if self.is_shared && other.is_shared && self.role == other.role {
+        if self.is_shared && other.is_shared && self.is_feedback == other.is_feedback {
             return false;
         }
         let (extended, raw) = raw(self.id);
@@ -117,10 +114,14 @@ impl Claim {
         self.id
     }
 
-    /// Returns the sender of the frames.
+    /// Returns whether the motor sends the frames, and not the controller.
     #[must_use]
-    pub const fn role(&self) -> Role {
-        self.role
+    pub const fn is_feedback(&self) -> bool {
+        self.is_feedback
+    }
+
+    const fn direction(&self) -> &'static str {
+        if self.is_feedback { "feedback" } else { "command" }
     }
 
     pub(super) const fn is_shared(&self) -> bool {
@@ -143,18 +144,14 @@ fn raw(id: Id) -> (bool, u32) {
 
 impl core::fmt::Display for Claim {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let role = match self.role {
-            Role::Command => "command",
-            Role::Feedback => "feedback",
-        };
-        write!(f, "{} of {} on 0x{:X}", role, self.motor, raw(self.id).1)
+        write!(f, "{} of {} on 0x{:X}", self.direction(), self.motor, raw(self.id).1)
     }
 }
 
 #[cfg(feature = "defmt")]
 impl defmt::Format for Claim {
     fn format(&self, f: defmt::Formatter<'_>) {
-        defmt::write!(f, "{} of {} on {=u32:#x}", self.role, self.motor, raw(self.id).1);
+        defmt::write!(f, "{=str} of {} on {=u32:#x}", self.direction(), self.motor, raw(self.id).1);
     }
 }
 
@@ -233,19 +230,18 @@ impl Route {
     pub(crate) fn of<I: IntoIterator<Item = Claim>>(claims: impl Fn() -> I) -> Self {
         let mut route = Self::NONE;
         for claim in claims() {
-            if claim.role() == Role::Feedback && route.usual.is_none() {
+            if claim.is_feedback() && route.usual.is_none() {
                 route.usual = Pattern::of(&claim);
             }
-            match claim.role() {
-                Role::Feedback if claim.is_shared() => route.shared.add(&claim),
-                Role::Feedback => route.feedback.add(&claim),
-                Role::Command if claim.is_shared() => {}
-                Role::Command => route.command.add(&claim),
+            match (claim.is_feedback(), claim.is_shared()) {
+                (true, true) => route.shared.add(&claim),
+                (true, false) => route.feedback.add(&claim),
+                (false, true) => {}
+                (false, false) => route.command.add(&claim),
             }
         }
-        let mut commands = claims()
-            .into_iter()
-            .filter(|claim| claim.role() == Role::Command && !claim.is_shared());
+        let mut commands =
+            claims().into_iter().filter(|claim| !claim.is_feedback() && !claim.is_shared());
         if !commands.any(|claim| Pattern::of(&claim).meets(&route.usual)) {
             route.certain = route.usual;
         }
@@ -323,18 +319,20 @@ mod tests {
     #[test]
     fn one_motor_may_use_an_id_in_both_directions_and_two_may_not() {
         let id = StandardId::new(5).unwrap();
-        let claim = |role, name| Claim::new(id, role, MotorName::new(name, 5));
-        let command = claim(Role::Command, "joint");
-        assert!(!command.clashes_with(&claim(Role::Feedback, "joint")));
+        let command = |name| Claim::command(id, MotorName::new(name, 5));
+        let feedback = |name| Claim::feedback(id, MotorName::new(name, 5));
+        let command = command("joint");
+        assert!(!command.clashes_with(&feedback("joint")));
         assert!(command.clashes_with(&command)); // attached twice
         assert!(command.covers(id) && !command.covers(StandardId::ZERO));
-        assert!(command.clashes_with(&claim(Role::Feedback, "another")));
+        assert!(command.clashes_with(&feedback("another")));
         // Others answer with this id while the motor is commanded with it.
-        assert!(command.clashes_with(&claim(Role::Feedback, "joint").shared()));
+        assert!(command.clashes_with(&feedback("joint").shared()));
     }
 
-    fn claim(id: impl Into<Id>, role: Role) -> Claim {
-        Claim::new(id, role, MotorName::new("mine", 1))
+    fn claim(id: impl Into<Id>, is_feedback: bool) -> Claim {
+        let name = MotorName::new("mine", 1);
+        if is_feedback { Claim::feedback(id, name) } else { Claim::command(id, name) }
     }
 
     fn standard(raw: u16) -> StandardId {
@@ -353,10 +351,12 @@ mod tests {
         for _ in 0..2_000 {
             let claims: Vec<Claim> = (0..below(5))
                 .map(|_| {
-                    let role = if below(2) == 0 { Role::Feedback } else { Role::Command };
+                    let is_feedback = below(2) == 0;
                     let claim = match below(8) {
-                        0 => claim(extended, role),
-                        _ => claim(standard(0x200 + u16::try_from(below(16)).unwrap()), role),
+                        0 => claim(extended, is_feedback),
+                        _ => {
+                            claim(standard(0x200 + u16::try_from(below(16)).unwrap()), is_feedback)
+                        }
                     };
                     let claim = if below(4) == 0 { claim.with_mask(0x7F0) } else { claim };
                     if below(4) == 0 { claim.shared() } else { claim }
@@ -367,19 +367,19 @@ mod tests {
                 let ids = [Id::from(standard(raw)), ExtendedId::new(raw.into()).unwrap().into()];
                 for id in ids {
                     let frame = CanFrame::of(id, [0; 8]);
-                    let covered = |role: Role, shared: bool| {
+                    let covered = |is_feedback: bool, shared: bool| {
                         claims.iter().any(|claim| {
-                            claim.role() == role
+                            claim.is_feedback() == is_feedback
                                 && (shared || !claim.is_shared())
                                 && claim.covers(frame.id())
                         })
                     };
-                    let is_feedback = covered(Role::Feedback, true);
-                    let concerns = is_feedback || covered(Role::Command, false);
+                    let is_feedback = covered(true, true);
+                    let concerns = is_feedback || covered(false, false);
                     assert!(route.fits(&frame) || !concerns, "{frame:?} of {claims:?}");
                     refused += u32::from(!route.fits(&frame));
                     let is_certain = route.is_feedback(&frame);
-                    let is_only = is_feedback && !covered(Role::Command, false);
+                    let is_only = is_feedback && !covered(false, false);
                     assert!(!is_certain || is_only, "{frame:?} of {claims:?}");
                     certain += u32::from(is_certain);
                 }

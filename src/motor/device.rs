@@ -1,6 +1,6 @@
 //! A device, and actions on every device of several: one visitor for each action.
 
-use super::{Claim, Condition, MotorName, Obstacles, Role, WrongSetting};
+use super::{Claim, Condition, MotorName, Obstacles, WrongSetting};
 use crate::frame::CanFrame;
 use crate::time::{Edge, Instant, Tick};
 use core::ops::Range;
@@ -216,7 +216,7 @@ pub(super) struct Back<'a> {
 impl Visitor for Back<'_> {
     #[inline]
     fn visit(&mut self, device: &mut impl CanDevice) {
-        let sends = |claim: Claim| claim.role() == Role::Command && claim.id() == self.frame.id();
+        let sends = |claim: Claim| !claim.is_feedback() && claim.id() == self.frame.id();
         let asks = !self.to_owner || device.claims().any(sends);
         self.taken = self.taken || (asks && device.requeue(self.frame));
     }

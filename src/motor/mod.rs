@@ -78,7 +78,7 @@ pub(crate) use arming::Obstacles;
 pub use arming::{ArmError, ArmingSwitch, Missing, SwitchOrder, WrongSetting};
 pub use capability::{Capabilities, Capability};
 pub(crate) use claim::Route;
-pub use claim::{Claim, MotorName, Role};
+pub use claim::{Claim, MotorName};
 pub use device::{CanDevice, Ingest, Visitor};
 pub use devices::Devices;
 pub(crate) use devices::ask;

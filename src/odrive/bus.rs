@@ -10,8 +10,8 @@ use crate::control::PidConfig;
 use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::{
-    Capabilities, Capability, Claim, DriveProtocol, Goal, Ingest, MotorName, Order, Role, Told,
-    Vitals, WrongSetting, code_from, ingest_eight, lowest_bit,
+    Capabilities, Capability, Claim, DriveProtocol, Goal, Ingest, MotorName, Order, Told, Vitals,
+    WrongSetting, code_from, ingest_eight, lowest_bit,
 };
 use crate::units::{Angle, AngularVelocity};
 use core::f32::consts::TAU;
@@ -52,10 +52,11 @@ impl DriveProtocol for Motor {
 
     fn claims(&self) -> impl IntoIterator<Item = Claim> {
         let (node, name, has_endpoints) = (self.node, self.name(), self.endpoints.is_some());
-        let claim = move |role| move |number: &u8| Claim::new(id(node, *number), role, name);
+        let feedback = move |number: &u8| Claim::feedback(id(node, *number), name);
+        let command = move |number: &u8| Claim::command(id(node, *number), name);
         let sent = COMMANDS.iter().filter(move |number| has_endpoints || **number != ASK_ENDPOINT);
         let (heard, _) = self.firmware.facts();
-        heard.iter().map(claim(Role::Feedback)).chain(sent.map(claim(Role::Command)))
+        heard.iter().map(feedback).chain(sent.map(command))
     }
 
     fn decode(&mut self, frame: &CanFrame) -> Ingest {

@@ -11,7 +11,7 @@ use crate::lk::codec::{id_of, is_command};
 use crate::lk::model::RAD_PER_DEGREE;
 use crate::motor::{
     Capabilities, Capability, Claim, DriveProtocol, Goal, Ingest, MotorName, Order, Questions,
-    Role, Vitals, WrongSetting, lowest_bit,
+    Vitals, WrongSetting, lowest_bit,
 };
 use crate::units::{Angle, AngularVelocity};
 
@@ -92,8 +92,8 @@ impl DriveProtocol for Motor {
     }
 
     fn claims(&self) -> impl IntoIterator<Item = Claim> {
-        let claim = |ids, role| Claim::new(id_of(ids, self.id), role, self.name());
-        [claim(IDS.0, Role::Command), claim(IDS.1, Role::Feedback)]
+        let (command, feedback) = (id_of(IDS.0, self.id), id_of(IDS.1, self.id));
+        [Claim::command(command, self.name()), Claim::feedback(feedback, self.name())]
     }
 
     fn decode(&mut self, frame: &CanFrame) -> Ingest {

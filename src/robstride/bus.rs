@@ -9,8 +9,7 @@ use crate::error::{ConfigError, check};
 use crate::frame::{CanFrame, extended_id};
 use crate::motor::{
     Capabilities, Capability, Claim, DriveProtocol, Ingest, Inquiry, MotorName, Order, Preparation,
-    Role, Settings, TimeoutUnits, Vitals, WrongSetting, code_from, ingest_eight,
-    register_questions,
+    Settings, TimeoutUnits, Vitals, WrongSetting, code_from, ingest_eight, register_questions,
 };
 use crate::time::Duration;
 use crate::units::{Angle, AngularVelocity};
@@ -211,13 +210,11 @@ impl DriveProtocol for Motor {
     /// The state of the drive is in the id of its feedback, and the torque in the id of the operation command.
     fn claims(&self) -> impl IntoIterator<Item = Claim> {
         let (motor, name) = (u32::from(self.id), self.name());
-        let claim = move |raw, mask, role| Claim::new(extended_id(raw), role, name).with_mask(mask);
         let answer = 0x1100_0000 | motor << 8 | u32::from(self.host);
-        let feedback = [
-            claim(0x0200_0000 | motor << 8, 0x1F00_FF00, Role::Feedback),
-            claim(answer, 0x1B00_FFFF, Role::Feedback),
-        ];
-        let command = COMMANDS.map(|(raw, mask)| claim(raw | motor, mask, Role::Command));
+        let feedback = [(0x0200_0000 | motor << 8, 0x1F00_FF00), (answer, 0x1B00_FFFF)]
+            .map(|(raw, mask)| Claim::feedback(extended_id(raw), name).with_mask(mask));
+        let command = COMMANDS
+            .map(|(raw, mask)| Claim::command(extended_id(raw | motor), name).with_mask(mask));
         feedback.into_iter().chain(command)
     }
 

@@ -4,7 +4,7 @@ use super::slot::{Slot, health};
 use super::{Joints, schedule};
 use crate::frame::CanFrame;
 use crate::motor::{
-    CanDevice, Claim, Condition, Devices, Guard, Ingest, MotorName, Role, Visitor, WrongSetting,
+    CanDevice, Claim, Condition, Devices, Guard, Ingest, MotorName, Visitor, WrongSetting,
 };
 use crate::time::{Edge, Instant, Tick};
 use embedded_can::StandardId;
@@ -37,13 +37,13 @@ impl CanDevice for Joints {
 
     /// Each joint has one id, in both directions.
     fn claims(&self) -> impl Iterator<Item = Claim> {
-        let joints = || self.slots.iter().filter_map(|slot| slot.id.zip(slot.name()));
-        let claims = move |role| {
-            joints().filter_map(move |(id, name)| {
-                Some(Claim::new(StandardId::new(u16::from(id))?, role, name))
-            })
+        let joints = || {
+            self.slots
+                .iter()
+                .filter_map(|slot| StandardId::new(u16::from(slot.id?)).zip(slot.name()))
         };
-        claims(Role::Feedback).chain(claims(Role::Command))
+        let feedback = joints().map(|(id, name)| Claim::feedback(id, name));
+        feedback.chain(joints().map(|(id, name)| Claim::command(id, name)))
     }
 
     fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName> {
@@ -62,7 +62,7 @@ impl CanDevice for Joints {
     fn second_master(&self) -> Option<Claim> {
         let slot = self.slots.iter().find(|slot| health::has_rival(slot))?;
         let id = StandardId::new(u16::from(slot.id?))?;
-        Some(Claim::new(id, Role::Command, slot.name()?))
+        Some(Claim::command(id, slot.name()?))
     }
 
     fn next_edge(&mut self) -> Option<Edge<Condition, MotorName>> {

@@ -9,8 +9,7 @@ use crate::encoder::Tachometer;
 use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::{
-    Capabilities, Capability, Claim, DriveProtocol, Ingest, MotorName, Order, Role, Vitals,
-    WrongSetting,
+    Capabilities, Capability, Claim, DriveProtocol, Ingest, MotorName, Order, Vitals, WrongSetting,
 };
 use crate::units::{Angle, AngularVelocity};
 use embedded_can::{Frame, Id};
@@ -144,10 +143,6 @@ impl Motor {
         self.angle_age < 100
     }
 
-    fn claim(&self, id: u8, (packet, bits): (u8, u8), role: Role) -> Claim {
-        Claim::new(extended(packet, id), role, self.name()).with_mask(!(u32::from(bits) << 8))
-    }
-
     /// Asks for the fault code. After four questions without an answer the code is unknown.
     fn ask(&mut self) -> CanFrame {
         if self.unanswered >= 4 {
@@ -181,12 +176,17 @@ impl DriveProtocol for Motor {
 
     /// All commands of the drive are claimed, in each mode: another program with such commands is a second master. Tools may ask.
     fn claims(&self) -> impl IntoIterator<Item = Claim> {
-        let own = |block, role| self.claim(self.id, block, role);
-        let commands = COMMANDS.map(|block| own(block, Role::Command));
-        let statuses = STATUSES.map(|block| own(block, Role::Feedback));
+        let (own, name) = (self.id, self.name());
+        let mask = |bits: u8| !(u32::from(bits) << 8);
+        let commands = COMMANDS.map(|(packet, bits)| {
+            Claim::command(extended(packet, own), name).with_mask(mask(bits))
+        });
+        let statuses = STATUSES.map(|(packet, bits)| {
+            Claim::feedback(extended(packet, own), name).with_mask(mask(bits))
+        });
         let questions = self.has_fault_code.then(|| {
-            let answer = self.claim(HOST, (SHORT_MESSAGE, 0), Role::Feedback);
-            [own((SHORT_MESSAGE, 0), Role::Command).shared(), answer.shared()]
+            let answer = Claim::feedback(extended(SHORT_MESSAGE, HOST), name);
+            [Claim::command(extended(SHORT_MESSAGE, own), name).shared(), answer.shared()]
         });
         commands.into_iter().chain(statuses).chain(questions.into_iter().flatten())
     }

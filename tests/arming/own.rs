@@ -1,9 +1,7 @@
 //! A motor of one's own: its feedback says how it is, and it notes whether it was driven.
 
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{
-    Actuator, Claim, DriveProtocol, Ingest, MotorName, Order, Role, Target, Vitals,
-};
+use drivetrain::motor::{Actuator, Claim, DriveProtocol, Ingest, MotorName, Order, Target, Vitals};
 use drivetrain::units::AngularVelocity;
 use embedded_can::{Frame, Id, StandardId};
 
@@ -51,8 +49,8 @@ impl DriveProtocol for Mine {
         MotorName::new("mine", self.id)
     }
     fn claims(&self) -> impl IntoIterator<Item = Claim> {
-        let claim = |base, role| Claim::new(standard(base + u16::from(self.id)), role, self.name());
-        [claim(0x180, Role::Feedback), claim(0x100, Role::Command)]
+        let id = |base| standard(base + u16::from(self.id));
+        [Claim::feedback(id(0x180), self.name()), Claim::command(id(0x100), self.name())]
     }
     fn decode(&mut self, frame: &CanFrame) -> Ingest {
         let [code, current, speed] = *frame.data() else {

@@ -4,8 +4,8 @@ use super::dji::OneModel;
 use super::*;
 use drivetrain::dji::M3508;
 use drivetrain::motor::{
-    CanDevice, Capabilities, Capability, Claim, Condition, Ingest, MotorName, Role, Target,
-    Visitor, WrongSetting,
+    CanDevice, Capabilities, Capability, Claim, Condition, Ingest, MotorName, Target, Visitor,
+    WrongSetting,
 };
 use drivetrain::sim::contract::{Rule, Violation};
 use drivetrain::time::{Duration, Edge, Instant, Tick};
@@ -422,8 +422,7 @@ impl DriveProtocol for Hasty {
         MotorName::new("hasty", 1)
     }
     fn claims(&self) -> impl IntoIterator<Item = Claim> {
-        [(0x123, Role::Command), (0x143, Role::Feedback)]
-            .map(|(raw, role)| Claim::new(id(raw), role, self.name()))
+        [Claim::command(id(0x123), self.name()), Claim::feedback(id(0x143), self.name())]
     }
     fn decode(&mut self, frame: &CanFrame) -> Ingest {
         if frame.data().len() == 3 { Ingest::Taken } else { Ingest::Unrelated }

@@ -2,7 +2,7 @@
 
 use super::*;
 use drivetrain::motor::{
-    ArmError, CanDevice, Claim, Condition, Ingest, MotorName, Role, Visitor, WrongSetting,
+    ArmError, CanDevice, Claim, Condition, Ingest, MotorName, Visitor, WrongSetting,
 };
 use drivetrain::pwm::{Brushed, BrushedConfig, RcPwm};
 use drivetrain::time::{Duration, Edge, Instant, Tick};
@@ -170,8 +170,8 @@ impl<M: OnPins> CanDevice for Wired<M> {
     }
     fn claims(&self) -> impl Iterator<Item = Claim> {
         let name = MotorName::new("brushed", 3);
-        let command = Claim::new(id(COMMAND), Role::Command, name);
-        let feedback = Claim::new(id(COUNTS), Role::Feedback, name);
+        let command = Claim::command(id(COMMAND), name);
+        let feedback = Claim::feedback(id(COUNTS), name);
         [Some(command), self.listens.then_some(feedback)].into_iter().flatten()
     }
     fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName> {

@@ -2,7 +2,7 @@
 
 use super::*;
 use drivetrain::encoder::GearRatio;
-use drivetrain::motor::{AngleDrive, Role};
+use drivetrain::motor::AngleDrive;
 use drivetrain::sim::{Drive as _, VescDrive};
 use drivetrain::units::Angle;
 use drivetrain::vesc::{Mode, Model, Motor, Rest};
@@ -138,6 +138,6 @@ fn only_questions_and_answers_are_shared_with_others() {
         let is_message = claim.id() == extended(0x801) || claim.id() == extended(0x8FE);
         assert_eq!(again, !is_message, "{claim}");
     }
-    let shared = first.claims().into_iter().filter(|claim| claim.role() == Role::Feedback);
+    let shared = first.claims().into_iter().filter(|claim| claim.is_feedback());
     assert_eq!(shared.count(), 6);
 }

@@ -1033,7 +1033,7 @@ fn position_mode_does_not_brake_hard_after_late_feedback() {
 /// A motor of one's own whose commands have an id that others share. Its command was refused: it is its own, as at 374294f.
 #[test]
 fn a_shared_command_of_an_own_motor_can_be_given_back() {
-    use drivetrain::motor::{Claim, Ingest, MotorName, Role};
+    use drivetrain::motor::{Claim, Ingest, MotorName};
     use embedded_can::StandardId;
     struct Shared;
     impl DriveProtocol for Shared {
@@ -1041,9 +1041,9 @@ fn a_shared_command_of_an_own_motor_can_be_given_back() {
             MotorName::new("shared", 1)
         }
         fn claims(&self) -> impl IntoIterator<Item = Claim> {
-            let claim =
-                |raw, role| Claim::new(StandardId::new(raw).unwrap(), role, self.name()).shared();
-            [claim(0x123, Role::Command), claim(0x124, Role::Feedback)]
+            let id = |raw| StandardId::new(raw).unwrap();
+            let command = Claim::command(id(0x123), self.name());
+            [command, Claim::feedback(id(0x124), self.name())].map(Claim::shared)
         }
         fn decode(&mut self, _: &CanFrame) -> Ingest {
             Ingest::Taken

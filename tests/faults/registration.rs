@@ -6,7 +6,7 @@ use drivetrain::dji::{
     AnyHandle, AttachError, Bus, Config, Facts, Gm6020Current, Gm6020Voltage, Handle, M2006, M3508,
     Model,
 };
-use drivetrain::motor::{ArmError, CanDevice, Claim, Devices, MotorName, Role, TargetError};
+use drivetrain::motor::{ArmError, CanDevice, Claim, Devices, MotorName, TargetError};
 use drivetrain::time::Tick;
 use embedded_can::StandardId;
 use proptest::prelude::*;
@@ -98,7 +98,7 @@ fn f46_every_pair_that_shares_an_id_or_a_slot_is_refused_and_no_other() {
     both.1.attach(Config::<M2006>::new(1)).unwrap();
     assert!(matches!(both.arm(at_ms(1)), Err(ArmError::Clash(..))));
     let id = StandardId::new(0x201).unwrap();
-    let damiao = Claim::new(id, Role::Command, MotorName::new("DM4310 (velocity)", 1));
+    let damiao = Claim::command(id, MotorName::new("DM4310 (velocity)", 1));
     assert!(both.0.claims().any(|claim| claim.clashes_with(&damiao)));
     saw(format!(
         "{refused} pairs refused, no other; two families: {}",

@@ -4,7 +4,7 @@ use drivetrain::frame::CanFrame;
 use drivetrain::math::wrap_pi;
 use drivetrain::motor::Impedance;
 use drivetrain::motor::{Capabilities, Capability, Claim, Ingest, MotorName, Order};
-use drivetrain::motor::{DriveProtocol, Role, Target, Vitals};
+use drivetrain::motor::{DriveProtocol, Target, Vitals};
 use drivetrain::units::{Angle, AngularVelocity};
 use drivetrain::wire::mit::{self, Feedback, Ranges};
 use embedded_can::{Frame, Id, StandardId};
@@ -68,8 +68,8 @@ impl DriveProtocol for J4310 {
     }
 
     fn claims(&self) -> impl IntoIterator<Item = Claim> {
-        let command = Claim::new(standard(self.id.into()), Role::Command, self.name());
-        [command, Claim::new(standard(self.master_id), Role::Feedback, self.name()).shared()]
+        let command = Claim::command(standard(self.id.into()), self.name());
+        [command, Claim::feedback(standard(self.master_id), self.name()).shared()]
     }
 
     fn decode(&mut self, frame: &CanFrame) -> Ingest {

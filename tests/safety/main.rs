@@ -19,7 +19,7 @@ mod subjects;
 
 use clock::{Clock, Random};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{Condition, Link, OPENING, Reaction, Role};
+use drivetrain::motor::{Condition, Link, OPENING, Reaction};
 use drivetrain::time::{Duration, Instant, Tick};
 use embedded_can::Frame;
 use reference::{Opens, Reference, Refusal, Rivals, Setup};
@@ -196,7 +196,7 @@ impl<S: Subject<N>, const N: usize> Trial<S, N> {
             assert_eq!(named.is_some(), motor.has_rival(), "a second master at {now}: {motor:?}");
             if let Some(claim) = named {
                 let command = self.subject.command(index).unwrap();
-                assert!(claim.role() == Role::Command && claim.covers(command.id()), "{claim}");
+                assert!(!claim.is_feedback() && claim.covers(command.id()), "{claim}");
             }
         }
         let frames: u32 = self.motors.iter().map(Reference::rival_frames).sum();

@@ -13,7 +13,7 @@ use drivetrain::frame::CanFrame;
 use drivetrain::math::{atan2, sin_cos, sqrt, wrap, wrap_pi, wrap_positive, wrap_tau};
 use drivetrain::motor::{
     Actuator, AngleDrive, ArmingSwitch, BusLoad, CanDevice, Capabilities, Capability, Claim,
-    Devices, DriveProtocol, Guard, Ingest, Measured, Missing, MotorName, Order, Role, StopHoming,
+    Devices, DriveProtocol, Guard, Ingest, Measured, Missing, MotorName, Order, StopHoming,
     Timeouts, VelocityDrive, Visitor, Vitals, WrongSetting,
 };
 use drivetrain::runner::{
@@ -225,11 +225,12 @@ fn motor() {
     ArmingSwitch::new.call();
     ArmingSwitch::read.call();
     Missing::full_bus.call();
-    (|id: Id, role: Role, motor: MotorName| Claim::new(id, role, motor)).call();
+    (|id: Id, motor: MotorName| Claim::command(id, motor)).call();
+    (|id: Id, motor: MotorName| Claim::feedback(id, motor)).call();
     Claim::with_mask.call();
     Claim::clashes_with.call();
     Claim::id.call();
-    Claim::role.call();
+    Claim::is_feedback.call();
     Claim::motor.call();
     Claim::shared.call();
     (|claim: &Claim, id: Id| Claim::covers(claim, id)).call();

@@ -4,7 +4,7 @@ use super::{Actuator, DriveProtocol, Offered, Target};
 use crate::frame::CanFrame;
 use crate::motor::{
     AngleDrive, CanDevice, Capabilities, Capability, Claim, Condition, Devices, Ingest, MotorName,
-    Repeat, Role, TargetError, VelocityDrive, Visitor, WrongSetting,
+    Repeat, TargetError, VelocityDrive, Visitor, WrongSetting,
 };
 use crate::time::{Edge, Instant, Tick, TimeStep};
 use crate::units::{Angle, AngularVelocity};
@@ -60,7 +60,7 @@ impl<M: DriveProtocol> CanDevice for Actuator<M> {
         }
         let may_send = |claim: Claim| {
             let is_its = is_known || !claim.is_shared();
-            claim.role() == Role::Command && is_its && claim.covers(frame.id())
+            !claim.is_feedback() && is_its && claim.covers(frame.id())
         };
         let is_own = match frame.is_remote() {
             true => is_known,

@@ -23,7 +23,7 @@ pub(crate) use registers::{
 pub(crate) use settings::{Inquiry, Preparation, Settings, TimeoutUnits};
 
 use super::{
-    BusLoad, Capability, Claim, Condition, Guard, Health, HealthConfig, Link, Repeat, Role, Route,
+    BusLoad, Capability, Claim, Condition, Guard, Health, HealthConfig, Link, Repeat, Route,
     TargetError, Timeouts, Watch,
 };
 use crate::control::PidConfig;
@@ -268,9 +268,9 @@ impl<M: DriveProtocol> Actuator<M> {
         let sent_hz = updates_hz.saturating_add(updates_hz.min(POWER_HZ));
         let answered_hz = sent_hz.checked_div(self.motor.frames_per_answer()).unwrap_or(0);
         let mut load = BusLoad::new(bit_rate);
-        for (role, hz) in [(Role::Command, sent_hz), (Role::Feedback, answered_hz)] {
-            if let Some(claim) = self.motor.claims().into_iter().find(|claim| claim.role() == role)
-            {
+        for (is_feedback, hz) in [(false, sent_hz), (true, answered_hz)] {
+            let mut claims = self.motor.claims().into_iter();
+            if let Some(claim) = claims.find(|claim| claim.is_feedback() == is_feedback) {
                 load = load.with_each(&CanFrame::of(claim.id(), [0; 8]), hz);
             }
         }

@@ -19,7 +19,7 @@ use crate::wire::mit::impedance::Impedance;
 /// use drivetrain::control::{Pid, PidConfig};
 /// use drivetrain::frame::CanFrame;
 /// use drivetrain::motor::{
-///     Claim, Devices, Ingest, MotorName, Order, Actuator, DriveProtocol, Role, Target, VelocityDrive,
+///     Claim, Devices, Ingest, MotorName, Order, Actuator, DriveProtocol, Target, VelocityDrive,
 /// };
 /// use drivetrain::time::{Duration, Instant, Tick};
 /// use drivetrain::units::AngularVelocity;
@@ -32,8 +32,7 @@ use crate::wire::mit::impedance::Impedance;
 /// impl DriveProtocol for Mine {
 ///     fn name(&self) -> MotorName { MotorName::new("mine", 1) }
 ///     fn claims(&self) -> impl IntoIterator<Item = Claim> {
-///         let claim = |raw, role| Claim::new(id(raw), role, self.name());
-///         [claim(0x123, Role::Command), claim(0x124, Role::Feedback)]
+///         [Claim::command(id(0x123), self.name()), Claim::feedback(id(0x124), self.name())]
 ///     }
 ///     fn decode(&mut self, frame: &CanFrame) -> Ingest {
 ///         let [high, low] = *frame.data() else {

@@ -3,7 +3,7 @@
 use super::joint::{Inside, Reading, Start};
 use super::{Actuator, DriveProtocol, INQUIRY, Offered, Order, SILENCE_US, Target};
 use crate::frame::CanFrame;
-use crate::motor::{Condition, Ingest, Link, Repeat, Role, Route, Vitals};
+use crate::motor::{Condition, Ingest, Link, Repeat, Route, Vitals};
 use crate::time::{Instant, TimeStep};
 use crate::units::Angle;
 use embedded_can::Frame;
@@ -75,11 +75,11 @@ impl<M: DriveProtocol> Actuator<M> {
         }
         let (mut is_feedback, mut command) = (false, None);
         for claim in self.motor.claims().into_iter().filter(|claim| claim.covers(frame.id())) {
-            match claim.role() {
-                Role::Feedback => is_feedback = true,
+            if claim.is_feedback() {
+                is_feedback = true;
+            } else if !claim.is_shared() {
                 // What others send on a shared id may be for another drive.
-                Role::Command if claim.is_shared() => {}
-                Role::Command => command = Some(claim),
+                command = Some(claim);
             }
         }
         let outcome = if is_feedback { self.take(frame, now) } else { Ingest::Unrelated };

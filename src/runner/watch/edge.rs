@@ -2,7 +2,7 @@
 //! back by the driver.
 
 use crate::frame::CanFrame;
-use crate::motor::{CanDevice, Claim, Devices, Role, Visitor, take_age};
+use crate::motor::{CanDevice, Claim, Devices, Visitor, take_age};
 use crate::time::{Duration, Edge, Instant};
 use core::num::NonZeroU32;
 
@@ -223,7 +223,7 @@ impl Visitor for FrameKey {
     fn visit(&mut self, device: &mut impl CanDevice) {
         let fits = |claim: &Claim| {
             let (header, mask) = claim.pattern();
-            claim.role() == Role::Command && (self.header ^ header) & mask == 0
+            !claim.is_feedback() && (self.header ^ header) & mask == 0
         };
         if let Some(claim) = device.claims().find(fits) {
             let mask = claim.pattern().1 | !VALUES;

@@ -1,7 +1,7 @@
 //! Rules about the edges of the motors of a device, and about arming after a trip or during a fault.
 
 use super::{Outcome, Rule, Run, Subject};
-use crate::motor::{ArmError, Claim, Condition, Conditions, Devices, Ingest, MotorName, Role};
+use crate::motor::{ArmError, Claim, Condition, Conditions, Devices, Ingest, MotorName};
 use crate::time::{Duration, Edge, Instant};
 use embedded_can::Frame;
 
@@ -52,7 +52,7 @@ fn called<S: Subject>(run: &mut Run<S>, motor: usize) -> Option<MotorName> {
     let id = run.subject.feedback(motor)?.id();
     let shares = |other: &usize| run.subject.feedback(*other).is_some_and(|frame| frame.id() == id);
     let before = (0..motor).filter(shares).count();
-    let feedback = |claim: &Claim| claim.role() == Role::Feedback && claim.covers(id);
+    let feedback = |claim: &Claim| claim.is_feedback() && claim.covers(id);
     let mut last = None;
     let claims = run.subject.device().claims().filter(feedback).map(|claim| claim.motor());
     // A motor may claim the id more than once.
@@ -221,7 +221,7 @@ pub(super) fn fault<S: Subject>(make: &impl Fn() -> S) -> Outcome {
 pub(super) fn second_master<S: Subject>(make: &impl Fn() -> S) -> Outcome {
     let rule = Rule::SecondMasterIsNotArmed;
     let commands = |run: &mut Run<S>, nth| {
-        let command = |claim: &Claim| claim.role() == Role::Command;
+        let command = |claim: &Claim| !claim.is_feedback();
         run.subject.device().claims().filter(command).nth(nth)
     };
     for nth in 0.. {

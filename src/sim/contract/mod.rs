@@ -6,7 +6,7 @@ mod rules;
 pub use rules::check_contract;
 
 use crate::frame::CanFrame;
-use crate::motor::{Claim, Devices, Ingest, Role, TargetError};
+use crate::motor::{Claim, Devices, Ingest, TargetError};
 use crate::time::{Instant, Tick};
 
 /// A device under test, as needed by [`check_contract`].
@@ -350,8 +350,8 @@ impl<S: Subject> Run<S> {
     fn is_command(&mut self, frame: &CanFrame) -> bool {
         use embedded_can::Frame;
         // A remote frame asks for feedback, and commands nothing.
-        let role = if frame.is_data_frame() { Role::Command } else { Role::Feedback };
+        let is_feedback = !frame.is_data_frame();
         let mut claims = self.subject.device().claims();
-        claims.any(|claim| claim.role() == role && claim.covers(frame.id()))
+        claims.any(|claim| claim.is_feedback() == is_feedback && claim.covers(frame.id()))
     }
 }

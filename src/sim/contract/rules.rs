@@ -1,6 +1,6 @@
 use super::{Outcome, Output, Rule, Run, Subject, Violation, edges};
 use crate::frame::CanFrame;
-use crate::motor::{ArmError, Claim, Devices, Ingest, Role, TargetError};
+use crate::motor::{ArmError, Claim, Devices, Ingest, TargetError};
 use crate::time::Tick;
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 
@@ -75,7 +75,7 @@ fn claims<S: Subject>(mut run: Run<S>) -> Outcome {
         let Some(frame) = run.subject.feedback(motor) else {
             return run.expect(false, Rule::ClaimsFeedback);
         };
-        let feedback = |claim: &Claim| claim.role() == Role::Feedback && claim.covers(frame.id());
+        let feedback = |claim: &Claim| claim.is_feedback() && claim.covers(frame.id());
         let claimed = run.subject.device().claims().any(|claim| feedback(&claim));
         run.expect(claimed, Rule::ClaimsFeedback)?;
     }
@@ -379,7 +379,7 @@ fn shorter(frame: &CanFrame) -> impl Iterator<Item = CanFrame> + '_ {
 /// A frame with an id of no motor.
 fn unclaimed(device: &mut impl Devices) -> Option<CanFrame> {
     let mut free = |id: &StandardId| {
-        let probe = Claim::new(*id, Role::Feedback, crate::motor::MotorName::new("foreign", 0));
+        let probe = Claim::feedback(*id, crate::motor::MotorName::new("foreign", 0));
         !device.claims().any(|claim| claim.clashes_with(&probe))
     };
     let id = (1..0x7FF).filter_map(StandardId::new).find(|id| free(id))?;

@@ -1,7 +1,7 @@
 //! Which motors have been told to rest, and of which of them the bus has seen it.
 
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{Claim, MotorName, Role};
+use drivetrain::motor::{Claim, MotorName};
 use embedded_can::Frame;
 
 /// The last command of a motor that the interface took.
@@ -25,7 +25,7 @@ pub(crate) struct Ledger {
 
 impl Ledger {
     pub(crate) fn new(claims: impl Iterator<Item = Claim>, is_told: bool) -> Self {
-        let commands = claims.filter(|claim| claim.role() == Role::Command).collect();
+        let commands = claims.filter(|claim| !claim.is_feedback()).collect();
         Self { commands, standing: Vec::new(), is_told }
     }
 

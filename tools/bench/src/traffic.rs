@@ -3,7 +3,7 @@
 use crate::guess;
 use crate::record::key;
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{Claim, Role};
+use drivetrain::motor::Claim;
 use drivetrain::sim::frame_bits;
 use drivetrain::time::{Duration, Instant};
 use embedded_can::Frame;
@@ -51,12 +51,11 @@ impl Traffic {
         let (is_extended, id) = key(frame);
         let row = self.rows.entry((is_extended, id, is_ours)).or_insert_with(|| {
             // LK and RMD answer with the id of their commands.
-            let likely = if is_ours { Role::Command } else { Role::Feedback };
             let covers = |claim: &&Claim| claim.covers(frame.id());
             let mut both = claims.iter().filter(covers);
-            let claim = both.clone().find(|claim| claim.role() == likely).or(both.next());
+            let claim = both.clone().find(|claim| claim.is_feedback() != is_ours).or(both.next());
             let owner = match (claim, guess::of(frame)) {
-                (Some(claim), _) if claim.role() == Role::Command => {
+                (Some(claim), _) if !claim.is_feedback() => {
                     format!("commands, {}", claim.motor())
                 }
                 (Some(claim), _) => claim.motor().to_string(),
@@ -73,9 +72,8 @@ impl Traffic {
 
     /// Tells whether a frame is a command to one of the motors, and no answer of any.
     pub(crate) fn is_command(&self, frame: &CanFrame) -> bool {
-        let has =
-            |role| self.claims.iter().any(|claim| claim.role() == role && claim.covers(frame.id()));
-        has(Role::Command) && !has(Role::Feedback)
+        let mut covering = self.claims.iter().filter(|claim| claim.covers(frame.id())).peekable();
+        covering.peek().is_some() && covering.all(|claim| !claim.is_feedback())
     }
 
     /// Ends the window of the rates, if it is over.
