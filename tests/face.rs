@@ -15,10 +15,44 @@ const SIMULATED: [&str; 6] =
 
 const MOST_OF_A_FAMILY: usize = 12;
 
-/// All others: 182, where the goal was 180, and 43 of later issues and users: referee system 3, super-capacitors 3, video link 2, abort of
-/// pending frames 2, impedance as a target 1, shooter 5, parameters 3, motion from any state 3, attitude 2, observer 1,
-/// state space 4, arms 2, a robot that balances 6, identification 4, the switch that arms 2.
-const MOST_OTHERS: usize = 182 + 43;
+/// All others, without those of [later issues](LATER).
+const MOST_OTHERS: usize = 180;
+
+/// Types that later issues and users asked for; commit 330c201, of which the goal speaks, had none of them. By name, so that a type gone
+/// leaves no room for another.
+#[rustfmt::skip]
+const LATER: [&str; 41] = [
+    // Referee system
+    "BarrelHeat", "Referee", "RefereeMessage",
+    // Super-capacitors
+    "CapacitorPlan", "HkustState", "PacificSpiritState",
+    // Video link
+    "VideoRemote",
+    // Abort of pending frames
+    "AbortPending", "NbAbort",
+    // Impedance as a target
+    "Impedance",
+    // Shooter
+    "Shooter", "ShooterFeedback", "ShooterOrder", "ShooterState", "ShooterTargets",
+    // Parameters
+    "Parameter", "ParameterRequest", "Parameters",
+    // Motion from any state
+    "Motion", "MotionFollower", "Motions",
+    // Attitude
+    "AttitudeSource",
+    // Observer
+    "LoadObserver",
+    // State space
+    "KalmanFilter", "LinearQuadraticRegulator", "LinearSystem", "LuenbergerObserver",
+    // Arms
+    "ArmJoint", "SerialArm",
+    // A robot that balances
+    "BalanceModel", "BalancePhase", "Balancer", "FiveBar", "LegEffort", "LegState",
+    // Identification
+    "Excitation", "Identification", "IdentificationError", "Plant",
+    // The switch that arms
+    "ArmingSwitch", "SwitchOrder",
+];
 
 /// Types that each family has under the same name, written with the path of the family.
 const SKELETON: [&str; 11] = [
@@ -94,6 +128,10 @@ fn the_face_has_no_more_types_than_its_bounds() {
         assert!((2..=MOST_OF_A_FAMILY).contains(&count), "{family}: {count} types");
         others -= count;
     }
+    for name in LATER {
+        assert!(types.iter().any(|(_, other)| *other == name), "{name} is no type any more");
+    }
+    others -= LATER.len();
     assert!(others <= MOST_OTHERS, "{others} types outside of these families");
 }
 
