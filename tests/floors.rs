@@ -283,6 +283,24 @@ fn the_decisions_are_numbered_in_their_order() {
     assert_eq!(numbers, (1..=numbers.len()).collect::<Vec<_>>());
 }
 
+/// Everyday verbs for which the glossary of `DESIGN.md` has words of the field.
+const VERBS: [&str; 7] = ["attend", "examine", "glance", "look", "relent", "see", "settle"];
+
+#[test]
+fn no_function_has_a_verb_for_which_the_glossary_has_another() {
+    let mut found = Vec::new();
+    for (_, path, text) in sources() {
+        for (line, name) in text.lines().filter_map(|line| Some((line, line.split_once("fn ")?.1)))
+        {
+            let verb = name.split(|c: char| !c.is_alphabetic()).next().unwrap_or_default();
+            if VERBS.contains(&verb) && !line.trim_start().starts_with("//") {
+                found.push(format!("{}: {}", path.display(), line.trim()));
+            }
+        }
+    }
+    assert!(found.is_empty(), "{found:#?}");
+}
+
 /// The device families on CAN.
 const FAMILIES: [&str; 8] = ["damiao", "dji", "lk", "odrive", "rmd", "robstride", "snake", "vesc"];
 

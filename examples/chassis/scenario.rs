@@ -151,7 +151,7 @@ impl Scenario {
             world.advance_with(Duration::from_micros(100), |frame| {
                 record(frame);
                 if let Some(commands) = &mut commands {
-                    commands.see(frame);
+                    commands.note(frame);
                 }
             });
             robot.poll(16);

@@ -22,7 +22,7 @@ impl CommandWatch {
     }
 
     /// Takes a frame on the wire; the controller sends nothing but commands.
-    pub(crate) fn see(&mut self, record: &Transmission) {
+    pub(crate) fn note(&mut self, record: &Transmission) {
         if record.sender == Sender::Controller && record.delivered {
             self.command(record.at);
         }

@@ -173,7 +173,7 @@ impl<K: Kinematics> Chassis<K> {
         measured: K::Wheels<Option<K::Speed>>,
         tick: Tick,
     ) -> K::Wheels<K::Speed> {
-        let dt_s = self.clock.see(tick.dt_s());
+        let dt_s = self.clock.take_step(tick.dt_s());
         self.measure(measured, dt_s);
         let heading = self.odometry.heading();
         let target = self.target(dt_s).to_world(heading);
@@ -186,7 +186,7 @@ impl<K: Kinematics> Chassis<K> {
         let twist = self.reference.to_body(heading).discretized(step_s);
         let wheels = self.kinematics.inverse(twist);
         let mut fastest = Fastest::default();
-        let _: K::Wheels<()> = K::map(wheels, |wheel| fastest.see(wheel.velocity()));
+        let _: K::Wheels<()> = K::map(wheels, |wheel| fastest.include(wheel.velocity()));
         let scale = fastest.scale(self.limits.wheel_speed());
         // A motion beyond the wheels must not wind up: the next step starts from the motion of the
         // wheels.

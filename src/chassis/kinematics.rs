@@ -92,7 +92,7 @@ pub trait Kinematics {
         limit: AngularVelocity,
     ) -> (Self::Wheels<Self::Speed>, f32) {
         let mut fastest = Fastest::default();
-        let _: Self::Wheels<()> = Self::map(wheels, |wheel| fastest.see(wheel.velocity()));
+        let _: Self::Wheels<()> = Self::map(wheels, |wheel| fastest.include(wheel.velocity()));
         let scale = fastest.scale(limit);
         (Self::map(wheels, |wheel| slowed(wheel, scale)), scale)
     }
@@ -175,7 +175,7 @@ pub(super) struct Fastest {
 }
 
 impl Fastest {
-    pub(super) fn see(&mut self, velocity: AngularVelocity) {
+    pub(super) fn include(&mut self, velocity: AngularVelocity) {
         let speed = velocity.as_rad_per_s().abs();
         self.broken |= !speed.is_finite();
         if speed > self.rad_per_s {

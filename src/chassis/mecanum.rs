@@ -293,7 +293,7 @@ macro_rules! named_wheels {
             #[must_use]
             pub fn desaturate(self, limit: AngularVelocity) -> (Self, f32) {
                 let mut fastest = Fastest::default();
-                $(fastest.see(self.$wheel);)+
+                $(fastest.include(self.$wheel);)+
                 let scale = fastest.scale(limit);
                 (self.map(|wheel| slowed(wheel, scale)), scale)
             }

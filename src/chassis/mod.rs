@@ -284,7 +284,7 @@ impl DeadClock {
     }
 
     /// Takes the step of a tick, and returns a usable step, above zero and finite, unchanged; otherwise zero.
-    const fn see(&mut self, dt_s: f32) -> f32 {
+    const fn take_step(&mut self, dt_s: f32) -> f32 {
         if dt_s > 0.0 && dt_s.is_finite() {
             self.0 = 0;
             dt_s

@@ -245,8 +245,8 @@ impl Modes {
         dt_s: f32,
     ) -> Option<Twist<Body>> {
         let command = if command.is_finite() { command } else { Twist::ZERO };
-        let dt_s = self.clock.see(dt_s);
-        self.see_yaw(gimbal_yaw, dt_s);
+        let dt_s = self.clock.take_step(dt_s);
+        self.take_yaw(gimbal_yaw, dt_s);
         let allowed = self.allowed();
         self.act(allowed);
         let wanted = match (self.acting, self.yaw) {
@@ -273,7 +273,7 @@ impl Modes {
         Some(self.output)
     }
 
-    fn see_yaw(&mut self, yaw: Option<Angle>, dt_s: f32) {
+    fn take_yaw(&mut self, yaw: Option<Angle>, dt_s: f32) {
         match yaw.filter(|angle| angle.is_finite()) {
             Some(angle) => {
                 self.yaw = Some(Heading::new(angle));

@@ -63,7 +63,7 @@ impl PowerBuffer {
     /// 100th such call in a row on the clock is dead, and a charge counts as missing.
     pub fn allowance_w(&mut self, limit_w: f32, energy_j: Option<f32>, dt_s: f32) -> f32 {
         let limit_w = not_negative(limit_w, "limit_w").unwrap_or(0.0);
-        let dt_s = self.clock.see(dt_s);
+        let dt_s = self.clock.take_step(dt_s);
         let charge = energy_j.filter(|energy| energy.is_finite() && !self.clock.is_dead());
         let Some(energy_j) = charge else {
             self.pid.reset();

@@ -195,7 +195,7 @@ impl Obstacles {
         Self::check(is_stopped, granted, |found| found.missing.extend(missing.into_iter()))
     }
 
-    // Inlined, so that a program that looks at no names has no code for them.
+    // Inlined, so that a program that reads no names has no code for them.
     #[inline]
     fn refusal(&self, granted: bool) -> Result<(), ArmError> {
         if !self.has_motors {

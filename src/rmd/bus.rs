@@ -241,7 +241,7 @@ impl DriveProtocol for Motor {
             _ if *data == self.last.encode() => self.doubt(),
             _ => return false,
         }
-        self.enabling.settle(self.preparation().is_some(), self.has_timeout());
+        self.enabling.confirm(self.preparation().is_some(), self.has_timeout());
         true
     }
 

@@ -141,7 +141,7 @@ pub(super) struct Enabling {
 
 impl Enabling {
     /// Takes whether the mode has to be prepared, and whether the drive has confirmed its time-out.
-    pub(super) const fn settle(&mut self, prepares: bool, has_timeout: bool) {
+    pub(super) const fn confirm(&mut self, prepares: bool, has_timeout: bool) {
         let is_prepared = self.is_prepared || !prepares;
         self.is_on |= self.is_wanted && self.is_sound && is_prepared && has_timeout;
     }

@@ -213,7 +213,7 @@ impl Shooter {
             ShooterOrder::Fire(1..) => {}
             _ => self.ordered = 0,
         }
-        let is_settled = match self.settle(wheels, dt_s) {
+        let is_settled = match self.await_speed(wheels, dt_s) {
             Ok(is_settled) => is_settled,
             Err(fault) => return self.fail(fault),
         };
@@ -222,7 +222,11 @@ impl Shooter {
     }
 
     /// Tells whether the wheels have been at their speed for the settling time.
-    fn settle(&mut self, wheels: [AngularVelocity; 2], dt_s: f32) -> Result<bool, ShooterState> {
+    fn await_speed(
+        &mut self,
+        wheels: [AngularVelocity; 2],
+        dt_s: f32,
+    ) -> Result<bool, ShooterState> {
         let target = self.config.wheels.as_rad_per_s();
         let allowed = self.config.tolerance * target;
         let are_within =

@@ -9,7 +9,7 @@ use core::cell::RefCell;
 
 /// Time limit of a blocking call, in simulated time.
 const PATIENCE_NS: u64 = 1_000_000_000;
-/// A blocking call looks again at least this often.
+/// A blocking call polls at least this often.
 const NAP_NS: u64 = 100_000;
 
 /// The driver's end of a simulated bus: three transmit mailboxes and a receive queue.

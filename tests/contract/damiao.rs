@@ -83,7 +83,7 @@ impl Subject for Joint {
         (command.id() != embedded_can::Id::from(id(0x7FF)))
             .then(|| CanFrame::of(command.id(), [0; 8]))
     }
-    fn settle_ms(&self) -> u64 {
+    fn preparation_ms(&self) -> u64 {
         100
     }
     fn opening_ms(&self) -> u64 {

@@ -75,7 +75,7 @@ impl Subject for Axle {
         turned.step(1e-6);
         drive.state() == Heartbeat::IDLE || turned.shaft().torque_nm() == 0.0
     }
-    fn settle_ms(&self) -> u64 {
+    fn preparation_ms(&self) -> u64 {
         100
     }
     fn opening_ms(&self) -> u64 {

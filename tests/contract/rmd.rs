@@ -71,7 +71,7 @@ impl Subject for Wheel {
     fn rival(&self, command: &Claim) -> Option<CanFrame> {
         Some(CanFrame::of(command.id(), [0xA1, 0, 0, 0, 100, 0, 0, 0]))
     }
-    fn settle_ms(&self) -> u64 {
+    fn preparation_ms(&self) -> u64 {
         100
     }
     fn opening_ms(&self) -> u64 {

@@ -76,7 +76,7 @@ impl Subject for Joint {
             }
         }
     }
-    fn settle_ms(&self) -> u64 {
+    fn preparation_ms(&self) -> u64 {
         150
     }
     fn opening_ms(&self) -> u64 {

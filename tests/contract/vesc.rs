@@ -87,7 +87,7 @@ impl Subject for Station {
     fn rival(&self, command: &Claim) -> Option<CanFrame> {
         (command.id() != extended(0x817)).then(|| CanFrame::of(command.id(), [0; 8]))
     }
-    fn settle_ms(&self) -> u64 {
+    fn preparation_ms(&self) -> u64 {
         100
     }
     fn opening_ms(&self) -> u64 {

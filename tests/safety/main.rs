@@ -141,7 +141,7 @@ impl<S: Subject<N>, const N: usize> Trial<S, N> {
                 );
                 self.seen.opening += u64::from(drives && motor.is_opening());
             }
-            motor.see(now, output, predicted, has_step);
+            motor.note(now, output, predicted, has_step);
         }
     }
 

@@ -80,7 +80,7 @@ pub trait Subject {
 
     /// Returns the milliseconds of feedback before arming, or before driving after a time without target: 0, unless its drives
     /// are asked for their settings or enabled first.
-    fn settle_ms(&self) -> u64 {
+    fn preparation_ms(&self) -> u64 {
         0
     }
 
@@ -220,14 +220,14 @@ impl<S: Subject> Run<S> {
     fn driving(subject: S) -> Result<Self, Violation> {
         let mut run = Self::new(subject);
         run.step()?;
-        run.settle()?;
+        run.prepare()?;
         run.arm_and_open(Rule::ArmedDrives)?;
         Ok(run)
     }
 
     /// Waits until arming succeeds.
-    fn settle(&mut self) -> Outcome {
-        for _ in 0..self.subject.settle_ms() {
+    fn prepare(&mut self) -> Outcome {
+        for _ in 0..self.subject.preparation_ms() {
             self.step()?;
         }
         Ok(())
@@ -254,7 +254,7 @@ impl<S: Subject> Run<S> {
 
     /// Drives after there was no target: the drives may have to be enabled.
     fn drive_again(&mut self, rule: Rule) -> Outcome {
-        for _ in 0..=self.subject.settle_ms() {
+        for _ in 0..=self.subject.preparation_ms() {
             let is_taken = self.subject.drive(1.0).is_ok();
             self.expect(is_taken, rule)?;
             if self.step()?.driving > 0 {

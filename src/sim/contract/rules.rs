@@ -105,7 +105,7 @@ fn missing<S: Subject>(mut run: Run<S>) -> Outcome {
         run.expect(named && !armed, Rule::MissingAreNamed)?;
         run.hear(heard);
     }
-    run.settle()?;
+    run.prepare()?;
     run.arm(Rule::ArmedDrives)
 }
 
@@ -116,7 +116,7 @@ fn armed<S: Subject>(mut run: Run<S>) -> Outcome {
 }
 
 fn opening<S: Subject>(mut run: Run<S>) -> Outcome {
-    run.step().and_then(|_| run.settle())?;
+    run.step().and_then(|_| run.prepare())?;
     run.arm(Rule::ArmedDrives)?;
     let (mut first, opening_ms) = (None, run.subject.opening_ms());
     for ms in 0..opening_ms {
@@ -332,7 +332,7 @@ fn from_zero<S: Subject>(mut run: Run<S>) -> Outcome {
     run.step()?;
     run.subject.device().disarm();
     let mut driving = run.drain()?.driving;
-    for _ in 0..=run.subject.settle_ms() {
+    for _ in 0..=run.subject.preparation_ms() {
         driving += run.step()?.driving;
     }
     run.arm(Rule::StartsFromZero)?;

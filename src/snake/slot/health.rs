@@ -118,8 +118,8 @@ fn check_stall(slot: &mut Slot, now: Instant) {
     let way = slot.target.wrapping_sub(raw).unsigned_abs();
     let moved = raw.wrapping_sub(slot.stands.at).unsigned_abs() > STANDS;
     let asked = is_up(slot) && way > THERE;
-    let looks = reaction != Reaction::Ignore && slot.guard.link() == Link::Online;
-    if moved || !(asked && looks && is_fast_enough(slot)) {
+    let is_watched = reaction != Reaction::Ignore && slot.guard.link() == Link::Online;
+    if moved || !(asked && is_watched && is_fast_enough(slot)) {
         slot.stands = Standing { at: raw, since: now };
     }
     let begins = now.since(slot.stands.since) >= window;

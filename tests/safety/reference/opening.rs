@@ -93,7 +93,13 @@ impl Reference {
     }
 
     /// Takes the output of an update. A drive at rest that might be driven was not enabled yet: its output opens anew.
-    pub(crate) fn see(&mut self, now: u64, output: f64, predicted: Option<Bounds>, has_step: bool) {
+    pub(crate) fn note(
+        &mut self,
+        now: u64,
+        output: f64,
+        predicted: Option<Bounds>,
+        has_step: bool,
+    ) {
         self.is_resting = output == 0.0;
         if !self.rules.is_prepared || !self.is_resting {
             return;
