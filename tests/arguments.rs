@@ -176,8 +176,15 @@ fn each_example_with_arguments_says_how_it_is_called() {
 /// Those that print and take no arguments.
 #[test]
 fn each_example_whose_output_nobody_reads_ends_quietly() {
-    let names =
-        ["async_sans_io", "custom_motor", "interrupt_queue", "mixed_robot", "sans_io", "two_buses"];
+    let names = [
+        "async_sans_io",
+        "custom_motor",
+        "interrupt_queue",
+        "mixed_robot",
+        "pwm",
+        "sans_io",
+        "two_buses",
+    ];
     for name in names {
         let output = unread(program(name));
         assert!(output.status.success() && output.stderr.is_empty(), "{name}: {output:?}");

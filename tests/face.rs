@@ -2,7 +2,7 @@
 
 #![cfg(test)]
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
@@ -158,6 +158,46 @@ fn the_face_has_no_more_functions_than_today() {
         api.lines().filter(is_function).count(),
         MOST_FUNCTIONS,
     );
+}
+
+/// Where a user reads: pages, examples and programs. The images of `firmware` that measure and link every function are none.
+const READ: [&str; 9] = [
+    "README.md",
+    "README.zh-CN.md",
+    "docs",
+    "examples",
+    "firmware/boards",
+    "firmware/ports",
+    "firmware/user",
+    "recipes",
+    "template",
+];
+
+/// Types that none of these names: those of today.
+const MOST_UNNAMED: usize = 4;
+
+/// Adds the words of a file of text, or of those below a folder.
+fn words(path: &Path, found: &mut BTreeSet<String>) {
+    if path.is_dir() {
+        let is_built = path.ends_with("target");
+        let entries = fs::read_dir(path).unwrap().filter(|_| !is_built);
+        entries.for_each(|entry| words(&entry.unwrap().path(), found));
+    } else if path.extension().is_some_and(|extension| extension == "rs" || extension == "md") {
+        let text = fs::read_to_string(path).unwrap();
+        found.extend(text.split(|c: char| !c.is_ascii_alphanumeric()).map(str::to_owned));
+    }
+}
+
+#[test]
+fn a_reader_meets_each_public_type_in_a_page_or_a_program() {
+    let mut read = BTreeSet::new();
+    READ.iter()
+        .for_each(|place| words(&Path::new(env!("CARGO_MANIFEST_DIR")).join(place), &mut read));
+    let api = api();
+    let unnamed: Vec<_> =
+        types(&api).into_iter().filter(|(_, name)| !read.contains(*name)).collect();
+    println!("unnamed: {unnamed:?}");
+    hold("public types that no page and no program names", unnamed.len(), MOST_UNNAMED);
 }
 
 #[test]
