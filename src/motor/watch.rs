@@ -66,6 +66,27 @@ impl Watch {
         self.traffic.count();
     }
 
+    /// Returns the gap from which feedback lengthens the longest gap of the present window.
+    pub(crate) const fn usual_gap_us(&self) -> u32 {
+        self.traffic.usual_gap_us()
+    }
+
+    /// Returns the share of the output that the conditions leave.
+    #[inline]
+    pub(crate) const fn share(&self) -> f32 {
+        self.share
+    }
+
+    /// Tells whether nothing but the [next](Self::next) check of slow quantities is due, as far as no condition holds.
+    pub(crate) const fn is_well(&self) -> bool {
+        self.error_code == 0 && !self.rival.is_present()
+    }
+
+    /// Returns the time of the next check of slow quantities.
+    pub(crate) const fn next(&self) -> Instant {
+        self.next
+    }
+
     /// Notes a command frame of another node.
     pub(crate) fn hear_rival(&mut self, now: Instant) {
         if !self.config.ignores(Condition::SecondMaster) {
@@ -111,7 +132,10 @@ impl Watch {
     #[inline(never)]
     fn check_all(&mut self, guard: &mut Guard, vitals: &Vitals, now: Instant) -> f32 {
         let before = guard.conditions();
-        self.traffic.end_window(&mut self.window_from, now);
+        self.traffic.add(guard.take_in_time());
+        if self.traffic.end_window(&mut self.window_from, now) {
+            guard.trust(0);
+        }
         self.rival.check(now);
         let has_rival = self.has_rival();
         if guard.link() != Link::Online {

@@ -1,6 +1,6 @@
 //! The motor as a device of the runner.
 
-use super::{Actuator, DriveProtocol, Offered, Target};
+use super::{Actuator, DriveProtocol, Offered, Order, Target};
 use crate::frame::CanFrame;
 use crate::motor::{
     AngleDrive, CanDevice, Capabilities, Capability, Claim, Condition, Devices, Ingest, MotorName,
@@ -24,18 +24,15 @@ impl<M: DriveProtocol> CanDevice for Actuator<M> {
 
     #[inline]
     fn update(&mut self, tick: Tick) {
-        let step = TimeStep::of_motor(tick.dt_s());
-        let left = self.check(tick.now());
-        let drives = self.guard.drives(tick.now());
-        if drives && !step.is_hold() && self.is_steady() {
-            self.power.pass(tick.now());
+        let (step, now) = (TimeStep::of_motor(tick.dt_s()), tick.now());
+        let goes_on = self.is_steady && !step.is_hold() && self.goes_on(now);
+        let due =
+            if goes_on { Some((self.target, self.watch.share())) } else { self.decide(step, now) };
+        if let Some((target, share)) = due {
             self.withdraw();
-            self.has_posted = false;
-            let frame = Some(self.follow(step, left));
+            let frame = Some(self.motor.control(Order { target, share, step }));
             self.offered = Offered { frame, waits: true, may_repeat: Repeat::ONCE, is_rest: false };
-            return;
         }
-        self.update_anyhow(drives, step, left, tick.now());
     }
 
     #[inline]
@@ -159,6 +156,16 @@ impl<M: DriveProtocol> Devices for Actuator<M> {
     #[inline]
     fn visit(&mut self, visitor: &mut impl Visitor) {
         visitor.visit(self);
+    }
+
+    #[inline]
+    fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
+        CanDevice::ingest(self, frame, now)
+    }
+
+    #[inline]
+    fn update(&mut self, tick: Tick) {
+        CanDevice::update(self, tick);
     }
 
     #[inline]

@@ -59,6 +59,8 @@ pub struct Actuator<M> {
     /// In the direction of the drive, as all below.
     target: Target,
     start: Start,
+    /// The last update drove the motor, and as long as its rules have nothing to change, the next one is to do the same.
+    is_steady: bool,
     is_resting: bool,
     offered: Offered,
     /// The last frame taken, but for the drive's power.
@@ -94,6 +96,7 @@ impl<M: DriveProtocol> Actuator<M> {
             power: Power::NEW,
             target: Target::Torque(0.0),
             start: Start::NONE,
+            is_steady: false,
             is_resting: true,
             offered: Offered::NOTHING,
             last: None,
@@ -115,6 +118,7 @@ impl<M: DriveProtocol> Actuator<M> {
     /// Names the parameter without a sensible value. Soft limits of a turn and more need a [zero](Self::with_zero) before, for a drive with
     /// [`Capability::AbsoluteAngle`]: such a drive may report another turn than that of the joint.
     pub fn with_health(mut self, config: &'static HealthConfig) -> Result<Self, &'static str> {
+        self.is_steady = false;
         self.watch = self.watch.with_config(config)?;
         if self.is_absolute() && self.joint.has_zero_of_drive() {
             match config.soft_limits {
@@ -202,6 +206,8 @@ impl<M: DriveProtocol> Actuator<M> {
         }
         let zero = measured - angle * self.joint.sign;
         self.joint.zero = if self.is_absolute() { Zero::Placed(zero) } else { Zero::Found(zero) };
+        // From now on each frame is compared with the one before.
+        self.guard.trust(0);
         self.guard.note(Condition::PositionUncertain, false, self.guard.device.updated());
         if self.shaft().1.is_some_and(|inside| inside.is_outside()) {
             self.reopen();
@@ -326,6 +332,7 @@ impl<M: DriveProtocol> Actuator<M> {
     /// The drive did not follow before: its output opens from zero, and its angle starts from where the shaft is.
     fn reopen(&mut self) {
         self.guard.reopen();
+        self.is_steady = false;
         self.start = Start::NONE;
     }
 }

@@ -51,6 +51,12 @@ impl Power {
         now: Instant::START,
     };
 
+    /// Tells whether a report of the drive changes nothing.
+    #[inline]
+    pub(super) fn expects(&self, report: Option<bool>) -> bool {
+        report == self.seen && (report != Some(false) || !self.on)
+    }
+
     /// Takes the state reported by the drive with a feedback frame; `None` without a report. Returns whether the drive has
     /// reset: enabled before, and disabled now.
     pub(super) fn hear(&mut self, report: Option<bool>, now: Instant) -> bool {

@@ -1,7 +1,7 @@
 //! What a motor does with a frame of its drive, and in an update.
 
 use super::joint::{Inside, Reading, Start};
-use super::{Actuator, DriveProtocol, INQUIRY, Offered, Order, SILENCE_US, Target};
+use super::{Actuator, DriveProtocol, INQUIRY, Offered, SILENCE_US, Target};
 use crate::frame::CanFrame;
 use crate::motor::{Condition, Ingest, Link, Repeat, Route, Vitals};
 use crate::time::{Instant, TimeStep};
@@ -15,16 +15,34 @@ impl<M: DriveProtocol> Actuator<M> {
         if self.motor.decode_answer(frame) {
             return Ingest::Taken;
         }
-        let gap_us = self.guard.gap_us(now);
         let outcome = self.motor.decode(frame);
         if outcome == Ingest::Taken {
-            self.hear(gap_us, now);
-            let gap_us = gap_us.unwrap_or(0);
-            if gap_us > SILENCE_US || self.joint.depends_on_supply() {
-                self.doubt(gap_us, now);
+            let is_usual = self.power.expects(self.motor.is_enabled());
+            if !is_usual || !self.guard.hear_in_time(now) {
+                self.hear(is_usual, now);
             }
         }
         outcome
+    }
+
+    /// Takes feedback that comes later than usual, or reports another state of the drive.
+    #[cold]
+    #[inline(never)]
+    fn hear(&mut self, is_usual: bool, now: Instant) {
+        self.is_steady &= is_usual;
+        let gap_us = self.guard.gap_us(now);
+        self.watch.hear(gap_us, now);
+        self.guard.hear(now);
+        if self.power.hear(self.motor.is_enabled(), now) {
+            self.fail(now);
+            self.motor.forget_settings();
+        }
+        let gap_us = gap_us.unwrap_or(0);
+        if gap_us > SILENCE_US || self.joint.depends_on_supply() {
+            self.doubt(gap_us, now);
+        }
+        let is_trusted = !self.joint.depends_on_supply();
+        self.guard.trust(if is_trusted { self.watch.usual_gap_us().min(SILENCE_US) } else { 0 });
     }
 
     /// Asks whether the drive started again: in a silence, unless feedback is late only after more, or before an angle that jumped. The
@@ -55,16 +73,6 @@ impl<M: DriveProtocol> Actuator<M> {
         }
     }
 
-    #[inline(always)]
-    fn hear(&mut self, gap_us: Option<u32>, now: Instant) {
-        self.watch.hear(gap_us, now);
-        self.guard.hear(now);
-        if self.power.hear(self.motor.is_enabled(), now) {
-            self.fail(now);
-            self.motor.forget_settings();
-        }
-    }
-
     #[inline(never)]
     pub(super) fn take_by_claims(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
         if frame.is_remote() {
@@ -86,6 +94,7 @@ impl<M: DriveProtocol> Actuator<M> {
         if outcome == Ingest::Unrelated && command.is_some() {
             self.rival = command;
             self.watch.hear_rival(now);
+            self.is_steady = false;
         }
         outcome
     }
@@ -99,16 +108,30 @@ impl<M: DriveProtocol> Actuator<M> {
 }
 
 impl<M: DriveProtocol> Actuator<M> {
-    /// Tells whether the drive is enabled, and no frame but a command is due: the case of almost each cycle of a driven motor.
+    /// Moves on to a tick in which the rules have nothing to change; otherwise returns `false`, and moves nothing.
     #[inline]
-    pub(super) fn is_steady(&self) -> bool {
-        let waits = self.switched.is_some() || self.switching.is_some() || self.offered.is_rest;
-        self.power.is_steady() && self.was_online && !waits
+    pub(super) fn goes_on(&mut self, now: Instant) -> bool {
+        let Vitals { has_fault, has_warning, error_code, .. } = self.motor.vitals();
+        let goes_on = !has_fault && !has_warning && error_code == 0 && self.guard.goes_on(now);
+        if goes_on {
+            self.power.pass(now);
+        }
+        goes_on
     }
 
-    /// Enables, disables, asks, commands and rests, as the motor may be driven or not.
+    /// Applies all rules: enables, disables, asks and rests, as the motor may be driven or not. Returns the goal of a command and the share of
+    /// the output, if a command is due.
+    #[cold]
     #[inline(never)]
-    pub(super) fn update_anyhow(&mut self, drives: bool, step: TimeStep, left: f32, now: Instant) {
+    pub(super) fn decide(&mut self, step: TimeStep, now: Instant) -> Option<(Target, f32)> {
+        self.is_steady = false;
+        let left = self.check(now);
+        let drives = self.guard.drives(now);
+        if drives && !step.is_hold() && self.was_online && self.has_nothing_due() {
+            self.power.pass(now);
+            self.has_posted = false;
+            return Some(self.goal(left));
+        }
         let may_drive = drives && self.offered.may_repeat.admits(step.is_hold());
         // A question that is given back from now on did not enable the drive, and rest that nobody took was not sent.
         self.switched.take_if(|_| self.power.is_confirmed() && self.switching.is_none());
@@ -122,7 +145,10 @@ impl<M: DriveProtocol> Actuator<M> {
         self.offered.is_rest &= !was_on || self.power.is_on();
         let inquiry = self.inquire(now);
         let is_at_rest = !may_drive || !self.power.is_ready();
-        let command = self.act(may_drive, step, left);
+        if !is_at_rest && !step.is_hold() {
+            return Some(self.goal(left));
+        }
+        let command = self.act(may_drive);
         // Between two frames of rest, another frame takes the place of one: the bus never has two of them at once to carry.
         let has_other = self.has_posted || inquiry.is_some();
         let gives_way = is_at_rest && self.offered.is_rest && has_other;
@@ -130,6 +156,30 @@ impl<M: DriveProtocol> Actuator<M> {
         self.offered.may_repeat = Repeat::after_update(!is_at_rest, step.is_hold());
         let is_rest = |frame: CanFrame| is_at_rest && !gives_way && !frame.is_remote();
         self.offered.is_rest = command.is_some_and(is_rest);
+        None
+    }
+
+    /// Tells whether the drive is enabled, and no frame but a command is due.
+    fn has_nothing_due(&self) -> bool {
+        let waits = self.switched.is_some() || self.switching.is_some() || self.offered.is_rest;
+        self.power.is_steady() && !waits
+    }
+
+    /// Returns the target as far as the output range is open, within the soft limits, and the share of the output, of which the
+    /// conditions leave so much.
+    fn goal(&mut self, left: f32) -> (Target, f32) {
+        self.is_resting = false;
+        let opened = self.guard.share();
+        let is_free = opened >= 1.0 && self.watch.soft_limits().is_none();
+        let is_well = self.watch.is_well() && self.guard.conditions().is_empty();
+        self.is_steady = is_free && is_well && self.has_nothing_due();
+        if is_free {
+            self.guard.wake_at(self.watch.next());
+            return (self.target, left);
+        }
+        let (shaft, inside) = self.shaft();
+        let goal = self.start.goal(self.target, opened, shaft, inside);
+        (goal, if left < opened { left } else { opened })
     }
 
     /// Checks the health of the motor and takes the reactions, which may relax the motor; returns the share of the output left.
@@ -231,9 +281,9 @@ impl<M: DriveProtocol> Actuator<M> {
         self.has_posted = frame.is_some();
     }
 
-    /// Returns the command of this step, or rest. If rest would disable a drive on the way to be enabled, returns the frame that asks
+    /// Returns the command before, or rest. If rest would disable a drive on the way to be enabled, returns the frame that asks
     /// for feedback.
-    fn act(&mut self, may_drive: bool, step: TimeStep, left: f32) -> Option<CanFrame> {
+    fn act(&mut self, may_drive: bool) -> Option<CanFrame> {
         if !may_drive || !self.power.is_ready() {
             // A late motor keeps its integral, one without a target starts afresh.
             if !self.guard.has_target() {
@@ -242,27 +292,7 @@ impl<M: DriveProtocol> Actuator<M> {
             let polls = may_drive && self.switched.is_some() && self.rest_disables;
             return if polls { self.motor.poll() } else { Some(self.rest()) };
         }
-        if step.is_hold() {
-            return self.offered.frame;
-        }
-        Some(self.follow(step, left))
-    }
-
-    /// Returns the command of this step.
-    #[inline]
-    pub(super) fn follow(&mut self, step: TimeStep, left: f32) -> CanFrame {
-        self.is_resting = false;
-        let opened = self.guard.share();
-        let is_free = opened >= 1.0 && self.watch.soft_limits().is_none();
-        let target = if is_free { self.target } else { self.goal(opened) };
-        let share = if left < opened { left } else { opened };
-        self.motor.control(Order { target, share, step })
-    }
-
-    /// Returns the target as far as the output range is open, and within the soft limits.
-    fn goal(&mut self, opened: f32) -> Target {
-        let (shaft, inside) = self.shaft();
-        self.start.goal(self.target, opened, shaft, inside)
+        self.offered.frame
     }
 
     #[inline]
@@ -273,6 +303,8 @@ impl<M: DriveProtocol> Actuator<M> {
         let (lower, upper) = self.watch.soft_limits().unwrap_or((0.0, 0.0));
         let middle = Angle::from_radians(0.5 * (lower + upper));
         self.joint.place_zero(self.measured_angle(), middle);
+        // From now on each frame is compared with the one before.
+        self.guard.trust(0);
     }
 
     /// Notes whether the shaft is at a soft limit.
@@ -297,6 +329,7 @@ impl<M: DriveProtocol> Actuator<M> {
 
     /// Rests at once, between two updates.
     pub(super) fn stop(&mut self) {
+        self.is_steady = false;
         self.relax();
         if self.power.stop() {
             self.disable();

@@ -34,14 +34,16 @@ impl Traffic {
         self.frames = self.frames.wrapping_add(1);
     }
 
-    /// Ends a window that began at `from` and is over at `now`, at a rate that the application chose.
-    pub(crate) fn end_window(&mut self, from: &mut Instant, now: Instant) {
+    /// Ends a window that began at `from`, at a rate that the application chose, if the window is over at `now`.
+    pub(crate) fn end_window(&mut self, from: &mut Instant, now: Instant) -> bool {
         let window = now.since(*from);
-        if window >= Self::WINDOW {
+        let is_over = window >= Self::WINDOW;
+        if is_over {
             let units = u16::try_from(window.as_micros() >> 10).unwrap_or(u16::MAX);
             self.close(units, u32::MAX);
             *from = now;
         }
+        is_over
     }
 
     /// Adds frames counted elsewhere.
@@ -56,6 +58,11 @@ impl Traffic {
         if gap > self.longest_gap {
             self.longest_gap = gap;
         }
+    }
+
+    /// Returns the time in µs from which a gap is longer than the longest of the present window.
+    pub(crate) const fn usual_gap_us(&self) -> u32 {
+        (self.longest_gap as u32 + 1) << GAP_SHIFT
     }
 
     /// Tells whether more frames come than one motor sends: each must then be [compared](Self::compare).

@@ -119,6 +119,12 @@ impl<const N: usize> DeviceGuard<N> {
         before < self.updated && self.updated < self.quiet_until
     }
 
+    /// Tells whether time moves on until `now`, and no age exceeds its limit then.
+    #[inline(always)]
+    pub(in crate::motor) fn is_quiet_at(&self, now: Instant) -> bool {
+        self.updated < now && now < self.quiet_until
+    }
+
     /// Notes feedback before the first update, which moves the time on. Returns the previous time.
     pub(crate) const fn pass_unwatched(&mut self, now: Instant) -> Instant {
         core::mem::replace(&mut self.updated, now)
@@ -155,6 +161,11 @@ impl<const N: usize> DeviceGuard<N> {
         // After a trip, each update counts towards the pause before a request to arm.
         let micros = if self.gesture.is_tripped() { 0 } else { micros };
         self.quiet_until = self.updated + Duration::from_micros(micros.into());
+    }
+
+    /// Counts as quiet until this time at most.
+    pub(in crate::motor) fn wake_at(&mut self, time: Instant) {
+        self.quiet_until = self.quiet_until.min(time);
     }
 
     /// Makes the next update compare the ages of each motor. Call this wherever an age may grow faster than time, or the limit of an age

@@ -141,7 +141,18 @@ impl MotorGuard {
     /// Tells whether feedback now comes within the trusted gap, for a motor that is online.
     #[inline(always)]
     pub(crate) const fn is_in_time(&self, now: u32) -> bool {
-        now.wrapping_sub(self.heard) < self.in_time >> COUNT_BITS
+        self.trusts(now.wrapping_sub(self.heard))
+    }
+
+    /// Tells whether a time in µs is shorter than the trusted gap.
+    #[inline(always)]
+    pub(in crate::motor) const fn trusts(&self, micros: u32) -> bool {
+        micros < self.in_time >> COUNT_BITS
+    }
+
+    /// Trusts no gap.
+    pub(in crate::motor) const fn distrust(&mut self) {
+        self.in_time &= COUNT;
     }
 
     /// Notes feedback that is [in time](Self::is_in_time).
@@ -227,7 +238,7 @@ impl MotorGuard {
 
     fn set_late(&mut self) {
         self.link = Link::Late;
-        self.in_time &= COUNT;
+        self.distrust();
         self.latch.set(Condition::Late, true);
         self.interrupt();
     }
@@ -235,7 +246,7 @@ impl MotorGuard {
     /// Handles a lost motor: relaxes, and refuses targets until armed again or, if configured, until recovered.
     fn lose(&mut self) {
         self.link = Link::Offline;
-        self.in_time &= COUNT;
+        self.distrust();
         self.latch.set(Condition::Late, true);
         self.latch.set(Condition::Offline, true);
         if self.is_armed() {
