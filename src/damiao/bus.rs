@@ -123,8 +123,8 @@ impl Motor {
     }
 
     #[inline]
-    fn frame_of(&self, command: Command) -> CanFrame {
-        CanFrame::of(standard_id(self.command_id()), command.encode(self.model.ranges()))
+    fn frame_of(&self, data: [u8; 8]) -> CanFrame {
+        CanFrame::of(standard_id(self.command_id()), data)
     }
 
     /// Returns the configured value of a register.
@@ -194,7 +194,7 @@ impl DriveProtocol for Motor {
     fn control(&mut self, order: Order) -> CanFrame {
         let command = self.drive.and_then(|drive| self.mode.command(order, &drive, &self.model));
         match command {
-            Some(command) => self.frame_of(command),
+            Some(data) => self.frame_of(data),
             None => self.rest(),
         }
     }
@@ -228,7 +228,8 @@ impl DriveProtocol for Motor {
 
     fn poll(&mut self) -> Option<CanFrame> {
         let stay = self.drive.and_then(|drive| self.mode.stay(&drive));
-        Some(stay.map_or_else(|| refresh(self.id), |stay| self.frame_of(stay)))
+        let frame = |stay: Command| self.frame_of(stay.encode(self.model.ranges()));
+        Some(stay.map_or_else(|| refresh(self.id), frame))
     }
 
     fn is_enabled(&self) -> Option<bool> {

@@ -72,29 +72,35 @@ impl Mode {
         self.0.check(vmax.min(model.vmax_rad_per_s()), 0.0, model.tmax_nm())
     }
 
-    /// Returns the command to the drive within the share of its largest effort; `None` to rest.
+    /// Returns the data of the command to the drive, within the share of its largest effort; `None` to rest.
     #[inline]
     pub(super) fn command(
         &mut self,
         order: Order,
         drive: &Feedback,
         model: &Model,
-    ) -> Option<Command> {
+    ) -> Option<[u8; 8]> {
         let shaft = (drive.angle(), drive.measured.velocity());
-        let goal = self.0.impedance_goal(order, shaft, model.ranges(), 4_095)?;
-        let limit = self.0.most_velocity();
-        let way = match goal {
-            Goal::Impedance(command) => return Some(Command::Mit(command)),
-            Goal::Velocity(velocity) => return Some(Command::Velocity(velocity)),
-            Goal::Way(way) => inside(drive.measured.position_rad, way, model.pmax_rad()),
-            Goal::Torque(_) => return None,
-        };
-        Some(match self.0.torque_limit_nm() {
-            Some(torque_nm) => {
-                Command::ForcePosition(way, limit, order.share * torque_nm / model.tmax_nm())
+        let command = match self.0.impedance_goal(order, shaft, model.ranges(), 4_095)? {
+            Goal::Torque(torque_nm) => return Some(model.ranges().encode_torque(torque_nm)),
+            Goal::Impedance(command) => Command::Mit(command),
+            Goal::Velocity(velocity) => Command::Velocity(velocity),
+            Goal::Way(way) => {
+                let position = inside(drive.measured.position_rad, way, model.pmax_rad());
+                self.toward(position, order.share, model)
             }
-            None => Command::PositionVelocity(way, limit * order.share),
-        })
+        };
+        Some(command.encode(model.ranges()))
+    }
+
+    fn toward(&self, position: f32, share: f32, model: &Model) -> Command {
+        let limit = self.0.most_velocity();
+        match self.0.torque_limit_nm() {
+            Some(torque_nm) => {
+                Command::ForcePosition(position, limit, share * torque_nm / model.tmax_nm())
+            }
+            None => Command::PositionVelocity(position, limit * share),
+        }
     }
 
     /// Returns a target where the shaft is, for before the drive is enabled. An enabled drive in MIT mode follows the last command,

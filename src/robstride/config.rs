@@ -108,6 +108,9 @@ impl Mode {
         let goal = self.control.impedance_goal(order, shaft, model.ranges(), 65_535)?;
         Some(match goal {
             Goal::Impedance(command) => Command::Operation(command),
+            Goal::Torque(torque_nm) if self.control.is_impedance() => {
+                Command::Operation(Impedance::torque(torque_nm))
+            }
             Goal::Torque(torque_nm) => {
                 let limit = self.current_a * order.share;
                 let current = (torque_nm / self.nm_per_ampere).min(limit).max(-limit);

@@ -189,10 +189,27 @@ impl Ranges {
         ((first as u64) << 32 | second as u64).to_be_bytes()
     }
 
+    /// Writes a torque in Nm alone, as [`encode`](Self::encode).
+    #[inline]
+    pub(crate) const fn encode_torque(&self, torque_nm: f32) -> [u8; 8] {
+        let [position, velocity, _, _, rest] = Self::rest(TOP_12);
+        let torque = match self.torque.counts(torque_nm, TOP_12) {
+            Some(torque) => torque,
+            None => rest,
+        };
+        let first = position << 16 | velocity << 4;
+        ((first as u64) << 32 | torque as u64).to_be_bytes()
+    }
+
+    /// Returns the counts of rest.
+    const fn rest(top: u16) -> [u32; 5] {
+        [TOP_16 as u32 / 2, top as u32 / 2, 0, 0, top as u32 / 2]
+    }
+
     /// Returns the counts of all fields, those of a position of 16 bits.
     #[inline]
     const fn counts(&self, command: &Impedance, top: u16) -> [u32; 5] {
-        let rest = [TOP_16 as u32 / 2, top as u32 / 2, 0, 0, top as u32 / 2];
+        let rest = Self::rest(top);
         let Some(torque) = self.torque.counts(command.torque_nm, top) else { return rest };
         if command.is_torque() {
             let [position, velocity, kp, kd, _] = rest;

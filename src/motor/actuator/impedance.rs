@@ -1,7 +1,7 @@
 //! The control of a drive in impedance mode, and our own loops on torque.
 
 use super::{Impedance, Order, Target};
-use crate::control::{Cascade, PidConfig, limited};
+use crate::control::{Pid, PidConfig, limited};
 use crate::error::ConfigError;
 use crate::math::wrap_pi;
 use crate::motor::{Capabilities, Capability};
@@ -76,7 +76,7 @@ impl ImpedanceControl {
     /// do not apply then.
     ///
     /// # Errors
-    /// As [`Pid::new`](crate::control::Pid::new).
+    /// As [`Cascade::new`](crate::control::Cascade::new).
     pub fn with_loops(self, position: PidConfig, speed: PidConfig) -> Result<Self, ConfigError> {
         let limit = self.torque_limit_nm;
         let loops = TorqueLoops::new(position, speed.with_output_limit(limit))?;
@@ -127,40 +127,45 @@ impl ImpedanceControl {
         most: &Impedance,
         count: &Impedance,
     ) -> Option<Impedance> {
-        self.step_within(order, (angle, velocity), || (*most, *count))
-    }
-
-    /// As [`step`](Self::step); ends and counts are not needed for a torque alone.
-    #[inline]
-    pub(crate) fn step_within(
-        &mut self,
-        order: Order,
-        shaft: Shaft,
-        fields: impl FnOnce() -> (Impedance, Impedance),
-    ) -> Option<Impedance> {
-        self.effort = 0.0;
-        let limit = self.torque_limit_nm * order.share;
-        let wanted = self.wanted(order, shaft)?;
-        let torque_nm = limited(wanted.torque_nm, -limit, limit);
-        if wanted.stiffness <= 0.0 && wanted.damping <= 0.0 {
-            self.effort = torque_nm / self.torque_limit_nm;
-            return Some(Impedance { torque_nm, ..Impedance::FREE });
+        let shaft = (angle, velocity);
+        match self.torque_alone(&order, shaft) {
+            Some(torque_nm) => Some(Impedance::torque(torque_nm)),
+            None => self.spring(&order, shaft, most, count),
         }
-        let (most, count) = fields();
-        self.spring(&Impedance { torque_nm, ..wanted }, shaft, order.share, &most, &count)
     }
 
-    /// Limits a spring and a damper beside a limited torque.
+    /// Returns the torque of a target that needs neither spring nor damper: a torque, or a velocity or an angle by our own loops.
+    #[inline(always)]
+    pub(crate) fn torque_alone(&mut self, order: &Order, shaft: Shaft) -> Option<f32> {
+        let limit = self.torque_limit_nm * order.share;
+        let looped = self.loops.as_mut().and_then(|loops| loops.step(order, shaft, limit));
+        let wanted = match order.target {
+            Target::Torque(torque_nm) => torque_nm,
+            _ => looped?,
+        };
+        let torque_nm = limited(wanted, -limit, limit);
+        self.effort = torque_nm / self.torque_limit_nm;
+        Some(torque_nm)
+    }
+
+    /// Returns the command of a target that is no [torque alone](Self::torque_alone), as [`step`](Self::step).
     #[inline(never)]
-    fn spring(
+    pub(crate) fn spring(
         &mut self,
-        wanted: &Impedance,
-        (angle, velocity): Shaft,
-        share: f32,
+        order: &Order,
+        shaft: Shaft,
         most: &Impedance,
         count: &Impedance,
     ) -> Option<Impedance> {
-        let (limit, torque_nm) = (self.torque_limit_nm * share, wanted.torque_nm);
+        self.effort = 0.0;
+        let (limit, share, (angle, velocity)) =
+            (self.torque_limit_nm * order.share, order.share, shaft);
+        let wanted = self.wanted(order, angle)?;
+        let torque_nm = limited(wanted.torque_nm, -limit, limit);
+        if wanted.stiffness <= 0.0 && wanted.damping <= 0.0 {
+            self.effort = torque_nm / self.torque_limit_nm;
+            return Some(Impedance::torque(torque_nm));
+        }
         let (per_count, per_count_s) = (count.angle.as_radians(), count.velocity.as_rad_per_s());
         let stiffness = share * wanted.stiffness.min(most.stiffness);
         let damping = share * wanted.damping.min(most.damping);
@@ -198,7 +203,26 @@ impl ImpedanceControl {
     }
 
     /// Returns the torque in Nm for a drive that follows torques; `None` to rest. Only the velocity has an end.
-    pub(crate) fn torque(&mut self, order: Order, shaft: Shaft, most_velocity: f32) -> Option<f32> {
+    #[inline]
+    pub(crate) fn torque(
+        &mut self,
+        order: &Order,
+        shaft: Shaft,
+        most_velocity: f32,
+    ) -> Option<f32> {
+        match self.torque_alone(order, shaft) {
+            Some(torque_nm) => Some(torque_nm),
+            None => self.torque_of_spring(order, shaft, most_velocity),
+        }
+    }
+
+    #[inline(never)]
+    fn torque_of_spring(
+        &mut self,
+        order: &Order,
+        shaft: Shaft,
+        most_velocity: f32,
+    ) -> Option<f32> {
         let most = Impedance {
             angle: Angle::from_radians(UNLIMITED),
             velocity: AngularVelocity::from_rad_per_s(most_velocity),
@@ -206,7 +230,7 @@ impl ImpedanceControl {
             damping: UNLIMITED,
             torque_nm: self.torque_limit_nm,
         };
-        self.step_within(order, shaft, || (most, Impedance::FREE))?;
+        self.spring(order, shaft, &most, &Impedance::FREE)?;
         let limit = self.torque_limit_nm * order.share;
         Some(limited(self.effort * self.torque_limit_nm, -limit, limit))
     }
@@ -220,17 +244,8 @@ impl ImpedanceControl {
     }
 
     /// Returns the impedance of a target.
-    #[inline(always)]
-    fn wanted(&mut self, order: Order, (angle, velocity): Shaft) -> Option<Impedance> {
-        let torque = |torque_nm| Impedance { torque_nm, ..Impedance::FREE };
-        if let Some(loops) = &mut self.loops {
-            let limit = self.torque_limit_nm * order.share;
-            if let Some(torque_nm) = loops.step(order, (angle, velocity), limit) {
-                return Some(torque(torque_nm));
-            }
-        }
+    fn wanted(&self, order: &Order, angle: Option<Angle>) -> Option<Impedance> {
         match (order.target, self.gains.filter(|_| self.loops.is_none())) {
-            (Target::Torque(torque_nm), _) => Some(torque(torque_nm)),
             (Target::Impedance(impedance), _) => Some(impedance),
             (Target::Velocity(velocity), Some((_, damping))) => {
                 Some(Impedance { velocity, damping, ..Impedance::FREE })
@@ -266,7 +281,8 @@ fn within(difference: f32, beside_nm: f32, gain: f32, limit: f32) -> f32 {
 /// A loop from the way to an angle, in rad, to a velocity, and a loop from a velocity, in rad/s, to a torque in Nm.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TorqueLoops {
-    loops: Cascade,
+    speed: Pid,
+    position: Pid,
     before: Before,
 }
 
@@ -283,21 +299,22 @@ enum Before {
 
 impl TorqueLoops {
     /// # Errors
-    /// As [`Pid::new`](crate::control::Pid::new).
+    /// As [`Pid::new`] for a loop.
     pub(crate) fn new(position: PidConfig, speed: PidConfig) -> Result<Self, ConfigError> {
-        Ok(Self { loops: Cascade::new(position, speed)?, before: Before::Rest })
+        let (position, speed) = (Pid::new(position)?, Pid::new(speed)?);
+        Ok(Self { speed, position, before: Before::Rest })
     }
 
     /// # Errors
-    /// As [`Pid::new`](crate::control::Pid::new). Nothing is changed then.
+    /// As [`Pid::new`] for a loop. Nothing is changed then.
     pub(crate) fn set_config(
         &mut self,
         position: PidConfig,
         speed: PidConfig,
     ) -> Result<(), ConfigError> {
         position.validate()?;
-        self.loops.speed_mut().set_config(speed)?;
-        self.loops.position_mut().set_config(position)
+        self.speed.set_config(speed)?;
+        self.position.set_config(position)
     }
 
     /// Returns the torque for a velocity or an angle, possibly more than the limit; `None` for another target, and for an angle
@@ -306,7 +323,7 @@ impl TorqueLoops {
     #[inline(always)]
     pub(crate) fn step(
         &mut self,
-        order: Order,
+        order: &Order,
         (angle, velocity): Shaft,
         limit_nm: f32,
     ) -> Option<f32> {
@@ -316,14 +333,15 @@ impl TorqueLoops {
                 if !matches!(self.before, Before::Velocity) {
                     self.take_over(Before::Velocity, velocity);
                 }
-                self.loops.speed_mut().step(target.as_rad_per_s(), velocity, &order.step)
+                self.speed.step(target.as_rad_per_s(), velocity, &order.step)
             }
             Target::Angle(target) => {
                 let way = wrap_pi((target - angle?).as_radians());
                 if !matches!(self.before, Before::Angle) {
                     self.take_over(Before::Angle, velocity);
                 }
-                self.loops.step(way, velocity, &order.step)
+                let wanted = self.position.step_error(way, velocity, &order.step);
+                self.speed.step(wanted, velocity, &order.step)
             }
             Target::Torque(torque_nm) => {
                 self.before = Before::Torque(limited(torque_nm, -limit_nm, limit_nm));
@@ -334,7 +352,7 @@ impl TorqueLoops {
                 return None;
             }
         };
-        self.loops.speed_mut().keep_integral_between(-limit_nm, limit_nm);
+        self.speed.keep_integral_between(-limit_nm, limit_nm);
         Some(torque_nm)
     }
 
@@ -342,12 +360,15 @@ impl TorqueLoops {
     #[cold]
     fn take_over(&mut self, now: Before, velocity: f32) {
         match core::mem::replace(&mut self.before, now) {
-            Before::Rest => self.loops.reset(),
-            Before::Torque(torque_nm) => {
-                self.loops.position_mut().reset_to(velocity);
-                self.loops.speed_mut().reset_to(torque_nm);
+            Before::Rest => {
+                self.position.reset();
+                self.speed.reset();
             }
-            Before::Velocity => self.loops.position_mut().reset_to(velocity),
+            Before::Torque(torque_nm) => {
+                self.position.reset_to(velocity);
+                self.speed.reset_to(torque_nm);
+            }
+            Before::Velocity => self.position.reset_to(velocity),
             Before::Angle => {}
         }
     }
@@ -371,7 +392,7 @@ mod tests {
         let loops = TorqueLoops::new(position, PidConfig::new(0.5, 20.0, 0.0)).unwrap();
         let step = |loops: &mut TorqueLoops, target| {
             let order = Order { target, share: 1.0, step: TimeStep::of(0.001) };
-            loops.step(order, (Some(Angle::ZERO), AngularVelocity::ZERO), LIMIT_NM)
+            loops.step(&order, (Some(Angle::ZERO), AngularVelocity::ZERO), LIMIT_NM)
         };
         (loops, step)
     }
@@ -408,7 +429,7 @@ mod tests {
             for _ in 0..200 {
                 step(&mut loops, velocity(1.0));
             }
-            assert!(loops.loops.speed().terms().i > 2.0);
+            assert!(loops.speed.terms().i > 2.0);
             assert_eq!(step(&mut loops, between), None);
             assert_eq!(step(&mut loops, velocity(0.0)), Some(0.0), "{between:?}");
             assert_eq!(step(&mut loops, between), None);

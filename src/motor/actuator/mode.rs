@@ -146,15 +146,16 @@ impl ControlMode {
     }
 
     /// Returns the goal of a drive that follows torques; `None` to rest. The velocity of the shaft is known up to so many rad/s.
+    #[inline]
     pub(crate) fn goal(&mut self, order: Order, shaft: Shaft, known: f32) -> Option<Goal> {
         match &mut self.follows {
-            Follows::Impedance(control) => control.torque(order, shaft, known).map(Goal::Torque),
+            Follows::Impedance(control) => control.torque(&order, shaft, known).map(Goal::Torque),
             _ => self.own_goal(order, shaft),
         }
     }
 
     /// Returns the goal of a drive that follows an impedance in fields of these ranges, with counts to `top`, of the position to
-    /// 65535; `None` to rest.
+    /// 65535; a torque alone without the other fields. `None` to rest.
     #[inline(always)]
     pub(crate) fn impedance_goal(
         &mut self,
@@ -164,11 +165,13 @@ impl ControlMode {
         top: u16,
     ) -> Option<Goal> {
         match &mut self.follows {
-            Follows::Impedance(control) => {
-                let fields = || (Impedance::most(ranges), Impedance::count(ranges, top));
-                let sent = control.step_within(order, shaft, fields)?;
-                Some(Goal::Impedance(sent))
-            }
+            Follows::Impedance(control) => match control.torque_alone(&order, shaft) {
+                Some(torque_nm) => Some(Goal::Torque(torque_nm)),
+                None => {
+                    let (most, count) = (Impedance::most(ranges), Impedance::count(ranges, top));
+                    control.spring(&order, shaft, &most, &count).map(Goal::Impedance)
+                }
+            },
             _ => self.own_goal(order, shaft),
         }
     }
