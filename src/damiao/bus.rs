@@ -56,8 +56,8 @@ pub struct Motor {
     master_id: u16,
     timeout: TimeoutUnits,
     mode: Mode,
-    /// The last feedback; `None` before the first.
-    drive: Option<Feedback>,
+    /// The last feedback; before the first with no possible status.
+    report: [u8; 8],
     settings: Settings<Register, { CHECKED.len() }>,
     /// Counts the frames to enable or disable the drive.
     specials: u8,
@@ -80,7 +80,7 @@ impl Motor {
             master_id: u16::from(id) + 0x10,
             timeout: TimeoutUnits::USUAL,
             mode,
-            drive: None,
+            report: [u8::MAX; 8],
             settings: Settings::new(CHECKED),
             specials: 0,
         })
@@ -108,14 +108,20 @@ impl Motor {
 
     /// Returns the last feedback of the drive; `None` before the first.
     #[must_use]
-    pub const fn feedback(&self) -> Option<&Feedback> {
-        self.drive.as_ref()
+    #[inline]
+    pub const fn feedback(&self) -> Option<Feedback> {
+        Feedback::decode(&self.report, self.model.ranges())
     }
 
     /// Has the drive keep all of its registers over a loss of the supply; while the motor is disarmed.
     /// The frame goes out once, for flash memory wears: a frame refused by the bus is lost.
     pub const fn store(&mut self) {
         self.settings.request(Inquiry::Store);
+    }
+
+    const fn status(&self) -> Option<Status> {
+        let [head, ..] = self.report;
+        Status::of(head >> 4)
     }
 
     const fn command_id(&self) -> u16 {
@@ -167,19 +173,19 @@ impl DriveProtocol for Motor {
         if head & 0xF != self.id {
             return Ingest::Unrelated;
         }
-        let Some(feedback) = Feedback::decode(data, self.model.ranges()) else {
+        if Status::of(head >> 4).is_none() {
             return Ingest::WrongField;
-        };
-        self.drive = Some(feedback);
+        }
+        self.report = *data;
         Ingest::Taken
     }
 
     fn velocity(&self) -> AngularVelocity {
-        self.drive.map_or(AngularVelocity::ZERO, |drive| drive.measured.velocity())
+        self.feedback().map_or(AngularVelocity::ZERO, |drive| drive.measured.velocity())
     }
 
     fn angle(&self) -> Option<Angle> {
-        self.drive?.angle()
+        self.feedback()?.angle()
     }
 
     fn rest(&mut self) -> CanFrame {
@@ -192,7 +198,8 @@ impl DriveProtocol for Motor {
     }
 
     fn control(&mut self, order: Order) -> CanFrame {
-        let command = self.drive.and_then(|drive| self.mode.command(order, &drive, &self.model));
+        let command =
+            self.feedback().and_then(|drive| self.mode.command(order, &drive, &self.model));
         match command {
             Some(data) => self.frame_of(data),
             None => self.rest(),
@@ -227,19 +234,20 @@ impl DriveProtocol for Motor {
     }
 
     fn poll(&mut self) -> Option<CanFrame> {
-        let stay = self.drive.and_then(|drive| self.mode.stay(&drive));
+        let stay = self.feedback().and_then(|drive| self.mode.stay(&drive));
         let frame = |stay: Command| self.frame_of(stay.encode(self.model.ranges()));
         Some(stay.map_or_else(|| refresh(self.id), frame))
     }
 
     fn is_enabled(&self) -> Option<bool> {
-        self.drive.map(|drive| drive.status == Status::Enabled)
+        self.status().map(|status| status == Status::Enabled)
     }
 
     fn inquire(&mut self) -> Option<CanFrame> {
         self.settings.inquire().map(|asked| inquiry(self.id, asked))
     }
 
+    #[inline]
     fn decode_answer(&mut self, frame: &CanFrame) -> bool {
         let data = frame.bytes();
         if frame.length() != 8 || !is_answer(data, self.id) {
@@ -265,7 +273,7 @@ impl DriveProtocol for Motor {
     }
 
     fn vitals(&self) -> Vitals {
-        let Some(drive) = self.drive else { return Vitals::default() };
+        let Some(drive) = self.feedback() else { return Vitals::default() };
         Vitals {
             temperature_c: Some(drive.driver_c.max(drive.rotor_c).into()),
             has_fault: drive.status.is_error(),
@@ -281,7 +289,7 @@ impl DriveProtocol for Motor {
 impl Motor {
     /// Disables the drive. If the drive reports an error, each second pair of frames clears the error, and the drive stays disabled.
     fn off(&mut self) -> CanFrame {
-        let has_error = self.drive.is_some_and(|drive| drive.status.is_error());
+        let has_error = self.status().is_some_and(Status::is_error);
         let clears = has_error && self.specials & 2 != 0;
         self.special(if clears { CLEAR_ERROR } else { mit::DISABLE })
     }

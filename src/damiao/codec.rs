@@ -141,6 +141,7 @@ impl Feedback {
 
     /// Reads a feedback frame; `None` for an unknown status.
     #[must_use]
+    #[inline]
     pub const fn decode(data: &[u8; 8], ranges: &Ranges) -> Option<Self> {
         let [head, a, b, c, d, e, driver_c, rotor_c] = *data;
         let Some(status) = Status::of(head >> 4) else { return None };
@@ -176,7 +177,7 @@ pub enum Status {
 }
 
 impl Status {
-    const fn of(nibble: u8) -> Option<Self> {
+    pub(super) const fn of(nibble: u8) -> Option<Self> {
         Some(match nibble {
             0 => Self::Disabled,
             1 => Self::Enabled,

@@ -254,10 +254,10 @@ impl Route {
         self.feedback.fits(frame) || self.command.fits(frame) || self.shared.fits(frame)
     }
 
-    /// Returns header and mask of the usual feedback, if there is one.
+    /// Returns header and mask of the usual feedback; all bits if there is none.
     #[inline]
-    pub(crate) const fn usual(&self) -> Option<(u32, u32)> {
-        if self.usual.is_none() { None } else { Some((self.usual.header, self.usual.mask)) }
+    pub(crate) const fn usual(&self) -> (u32, u32) {
+        (self.usual.header, self.usual.mask)
     }
 
     /// Tells whether a frame is the motor's usual feedback for certain, and no command of another node.

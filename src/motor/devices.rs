@@ -53,11 +53,11 @@ pub trait Devices {
         offer.outcome
     }
 
-    /// Returns header and mask of this device's usual feedback; `None`, unless said otherwise, if it has none.
+    /// Returns header and mask of this device's usual feedback; any, as zeros unless said otherwise, if it has none.
     ///
     /// An array of devices finds the first one to ask by it, if their headers are as far apart from each other as the first two.
-    fn usual_feedback(&self) -> Option<(u32, u32)> {
-        None
+    fn usual_feedback(&self) -> (u32, u32) {
+        (0, 0)
     }
 
     /// Takes a received frame of any driver's own type. A frame of more than 8 bytes is unrelated.
@@ -223,7 +223,7 @@ impl<D: Devices> Devices for &mut D {
     }
 
     #[inline]
-    fn usual_feedback(&self) -> Option<(u32, u32)> {
+    fn usual_feedback(&self) -> (u32, u32) {
         (**self).usual_feedback()
     }
 
@@ -242,9 +242,8 @@ impl<D: Devices, const N: usize> Devices for [D; N] {
 
     #[inline]
     fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
-        let first = place_of(self, frame.header()).filter(|place| *place < N);
         // The one that it is for is the first; where a frame is for none, or ids are shared, each is asked once.
-        let mut place = first.unwrap_or(0);
+        let mut place = place_of(self, frame.header());
         for _ in 0..N {
             let Some(device) = self.get_mut(place) else { break };
             let outcome = device.ingest(frame, now);
@@ -266,11 +265,12 @@ impl<D: Devices, const N: usize> Devices for [D; N] {
 
 /// Returns the place of the device whose usual feedback may have a header, for it to be asked first.
 #[inline]
-fn place_of<D: Devices>(devices: &[D], header: u32) -> Option<usize> {
-    let [one, two, ..] = devices else { return None };
-    let ((first, mask), (second, _)) = (one.usual_feedback()?, two.usual_feedback()?);
+fn place_of<D: Devices>(devices: &[D], header: u32) -> usize {
+    let [one, two, ..] = devices else { return 0 };
+    let ((first, mask), (second, _)) = (one.usual_feedback(), two.usual_feedback());
     let way = (header & mask).wrapping_sub(first);
-    usize::try_from(way.checked_div(second.wrapping_sub(first))?).ok()
+    let place = way.checked_div(second.wrapping_sub(first)).and_then(|place| place.try_into().ok());
+    place.filter(|place| *place < devices.len()).unwrap_or(0)
 }
 
 macro_rules! tuple {

@@ -82,8 +82,8 @@ impl Guard {
     #[inline]
     pub(super) fn hear_in_time(&mut self, now: Instant) -> bool {
         let now = now.stamp();
-        let is_in_time = self.motor.is_in_time(now)
-            && self.motor.trusts(now.wrapping_sub(self.device.now()));
+        let is_in_time =
+            self.motor.is_in_time(now) && self.motor.trusts(now.wrapping_sub(self.device.now()));
         if is_in_time {
             self.motor.hear_in_time(now);
         }

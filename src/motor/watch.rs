@@ -71,12 +71,6 @@ impl Watch {
         self.traffic.usual_gap_us()
     }
 
-    /// Returns the share of the output that the conditions leave.
-    #[inline]
-    pub(crate) const fn share(&self) -> f32 {
-        self.share
-    }
-
     /// Tells whether nothing but the [next](Self::next) check of slow quantities is due, as far as no condition holds.
     pub(crate) const fn is_well(&self) -> bool {
         self.error_code == 0 && !self.rival.is_present()

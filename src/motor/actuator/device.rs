@@ -26,25 +26,30 @@ impl<M: DriveProtocol> CanDevice for Actuator<M> {
     fn update(&mut self, tick: Tick) {
         let (step, now) = (TimeStep::of_motor(tick.dt_s()), tick.now());
         let goes_on = self.is_steady && !step.is_hold() && self.goes_on(now);
-        let due =
-            if goes_on { Some((self.target, self.watch.share())) } else { self.decide(step, now) };
-        if let Some((target, share)) = due {
+        if goes_on || self.decide(step, now) {
             self.withdraw();
-            let frame = Some(self.motor.control(Order { target, share, step }));
+            let target = *if goes_on { &self.target } else { &self.goal };
+            let frame = Some(self.motor.control(Order { target, share: self.share, step }));
             self.offered = Offered { frame, waits: true, may_repeat: Repeat::ONCE, is_rest: false };
+            self.has_frames = true;
         }
     }
 
     #[inline]
     fn next_frame(&mut self) -> Option<CanFrame> {
+        if !self.has_frames {
+            return None;
+        }
         if self.switching.is_some() {
             return self.switching.take();
         }
-        if core::mem::take(&mut self.offered.waits) {
-            self.last = self.offered.frame;
-            return self.last;
+        self.has_frames = false;
+        if !self.offered.waits {
+            return None;
         }
-        None
+        self.offered.waits = false;
+        self.last = self.offered.frame;
+        self.last
     }
 
     /// Each update offers the newest command anyway. A frame for the drive's power comes again if still wanted.
@@ -80,6 +85,7 @@ impl<M: DriveProtocol> CanDevice for Actuator<M> {
         } else {
             return false;
         }
+        self.has_frames = true;
         true
     }
 
@@ -169,7 +175,7 @@ impl<M: DriveProtocol> Devices for Actuator<M> {
     }
 
     #[inline]
-    fn usual_feedback(&self) -> Option<(u32, u32)> {
+    fn usual_feedback(&self) -> (u32, u32) {
         self.route.usual()
     }
 

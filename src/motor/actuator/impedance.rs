@@ -217,12 +217,7 @@ impl ImpedanceControl {
     }
 
     #[inline(never)]
-    fn torque_of_spring(
-        &mut self,
-        order: &Order,
-        shaft: Shaft,
-        most_velocity: f32,
-    ) -> Option<f32> {
+    fn torque_of_spring(&mut self, order: &Order, shaft: Shaft, most_velocity: f32) -> Option<f32> {
         let most = Impedance {
             angle: Angle::from_radians(UNLIMITED),
             velocity: AngularVelocity::from_rad_per_s(most_velocity),

@@ -58,10 +58,16 @@ pub struct Actuator<M> {
     power: Power,
     /// In the direction of the drive, as all below.
     target: Target,
+    /// What the drive is told of the target: less while the output range opens, and at a soft limit.
+    goal: Target,
+    /// The share of the output that is left.
+    share: f32,
     start: Start,
     /// The last update drove the motor, and as long as its rules have nothing to change, the next one is to do the same.
     is_steady: bool,
     is_resting: bool,
+    /// A frame may wait to be sent.
+    has_frames: bool,
     offered: Offered,
     /// The last frame taken, but for the drive's power.
     last: Option<CanFrame>,
@@ -95,9 +101,12 @@ impl<M: DriveProtocol> Actuator<M> {
             watch: Watch::new(),
             power: Power::NEW,
             target: Target::Torque(0.0),
+            goal: Target::Torque(0.0),
+            share: 0.0,
             start: Start::NONE,
             is_steady: false,
             is_resting: true,
+            has_frames: false,
             offered: Offered::NOTHING,
             last: None,
             switching: None,

@@ -1,7 +1,7 @@
 //! What a motor does with a frame of its drive, and in an update.
 
 use super::joint::{Inside, Reading, Start};
-use super::{Actuator, DriveProtocol, INQUIRY, Offered, SILENCE_US, Target};
+use super::{Actuator, DriveProtocol, INQUIRY, Offered, SILENCE_US};
 use crate::frame::CanFrame;
 use crate::motor::{Condition, Ingest, Link, Repeat, Route, Vitals};
 use crate::time::{Instant, TimeStep};
@@ -119,18 +119,19 @@ impl<M: DriveProtocol> Actuator<M> {
         goes_on
     }
 
-    /// Applies all rules: enables, disables, asks and rests, as the motor may be driven or not. Returns the goal of a command and the share of
-    /// the output, if a command is due.
+    /// Applies all rules: enables, disables, asks and rests, as the motor may be driven or not. Returns whether a command is due, of the goal
+    /// and with the share found here.
     #[cold]
     #[inline(never)]
-    pub(super) fn decide(&mut self, step: TimeStep, now: Instant) -> Option<(Target, f32)> {
+    pub(super) fn decide(&mut self, step: TimeStep, now: Instant) -> bool {
         self.is_steady = false;
         let left = self.check(now);
         let drives = self.guard.drives(now);
         if drives && !step.is_hold() && self.was_online && self.has_nothing_due() {
             self.power.pass(now);
             self.has_posted = false;
-            return Some(self.goal(left));
+            self.follow(left);
+            return true;
         }
         let may_drive = drives && self.offered.may_repeat.admits(step.is_hold());
         // A question that is given back from now on did not enable the drive, and rest that nobody took was not sent.
@@ -146,7 +147,8 @@ impl<M: DriveProtocol> Actuator<M> {
         let inquiry = self.inquire(now);
         let is_at_rest = !may_drive || !self.power.is_ready();
         if !is_at_rest && !step.is_hold() {
-            return Some(self.goal(left));
+            self.follow(left);
+            return true;
         }
         let command = self.act(may_drive);
         // Between two frames of rest, another frame takes the place of one: the bus never has two of them at once to carry.
@@ -156,7 +158,7 @@ impl<M: DriveProtocol> Actuator<M> {
         self.offered.may_repeat = Repeat::after_update(!is_at_rest, step.is_hold());
         let is_rest = |frame: CanFrame| is_at_rest && !gives_way && !frame.is_remote();
         self.offered.is_rest = command.is_some_and(is_rest);
-        None
+        false
     }
 
     /// Tells whether the drive is enabled, and no frame but a command is due.
@@ -165,9 +167,9 @@ impl<M: DriveProtocol> Actuator<M> {
         self.power.is_steady() && !waits
     }
 
-    /// Returns the target as far as the output range is open, within the soft limits, and the share of the output, of which the
-    /// conditions leave so much.
-    fn goal(&mut self, left: f32) -> (Target, f32) {
+    /// Finds the goal, as far as the output range is open and within the soft limits, and the share of the output, of which the conditions
+    /// leave so much.
+    fn follow(&mut self, left: f32) {
         self.is_resting = false;
         let opened = self.guard.share();
         let is_free = opened >= 1.0 && self.watch.soft_limits().is_none();
@@ -175,11 +177,12 @@ impl<M: DriveProtocol> Actuator<M> {
         self.is_steady = is_free && is_well && self.has_nothing_due();
         if is_free {
             self.guard.wake_at(self.watch.next());
-            return (self.target, left);
+            (self.goal, self.share) = (self.target, left);
+            return;
         }
         let (shaft, inside) = self.shaft();
-        let goal = self.start.goal(self.target, opened, shaft, inside);
-        (goal, if left < opened { left } else { opened })
+        self.goal = self.start.goal(self.target, opened, shaft, inside);
+        self.share = if left < opened { left } else { opened };
     }
 
     /// Checks the health of the motor and takes the reactions, which may relax the motor; returns the share of the output left.
@@ -279,6 +282,7 @@ impl<M: DriveProtocol> Actuator<M> {
     const fn post(&mut self, frame: Option<CanFrame>) {
         (self.switched, self.switching) = (frame, frame);
         self.has_posted = frame.is_some();
+        self.has_frames = true;
     }
 
     /// Returns the command before, or rest. If rest would disable a drive on the way to be enabled, returns the frame that asks
@@ -352,6 +356,7 @@ impl<M: DriveProtocol> Actuator<M> {
         self.withdraw();
         let (frame, waits) = (command.or(self.offered.frame), command.is_some());
         self.offered = Offered { frame, waits, ..Offered::NOTHING };
+        self.has_frames = true;
     }
 
     /// Takes back a frame still waiting for the bus.
