@@ -9,7 +9,7 @@ use crate::frame::{CanFrame, standard_id};
 use crate::motor::Impedance;
 use crate::motor::{
     Capabilities, Capability, Claim, DriveProtocol, Ingest, Inquiry, MotorName, Order, Preparation,
-    Settings, TimeoutUnits, Vitals, WrongSetting, register_questions,
+    Settings, Shaft, TimeoutUnits, Vitals, WrongSetting, register_questions,
 };
 use crate::time::Duration;
 use crate::units::{Angle, AngularVelocity};
@@ -56,7 +56,9 @@ pub struct Motor {
     master_id: u16,
     timeout: TimeoutUnits,
     mode: Mode,
-    /// The last feedback; before the first with no possible status.
+    /// Of the last feedback; `None` before the first.
+    status: Option<Status>,
+    /// The bytes of the last feedback.
     report: [u8; 8],
     settings: Settings<Register, { CHECKED.len() }>,
     /// Counts the frames to enable or disable the drive.
@@ -80,7 +82,8 @@ impl Motor {
             master_id: u16::from(id) + 0x10,
             timeout: TimeoutUnits::USUAL,
             mode,
-            report: [u8::MAX; 8],
+            status: None,
+            report: [0; 8],
             settings: Settings::new(CHECKED),
             specials: 0,
         })
@@ -108,9 +111,11 @@ impl Motor {
 
     /// Returns the last feedback of the drive; `None` before the first.
     #[must_use]
-    #[inline]
     pub const fn feedback(&self) -> Option<Feedback> {
-        Feedback::decode(&self.report, self.model.ranges())
+        match self.status {
+            Some(_) => Feedback::decode(&self.report, self.model.ranges()),
+            None => None,
+        }
     }
 
     /// Has the drive keep all of its registers over a loss of the supply; while the motor is disarmed.
@@ -119,9 +124,10 @@ impl Motor {
         self.settings.request(Inquiry::Store);
     }
 
-    const fn status(&self) -> Option<Status> {
-        let [head, ..] = self.report;
-        Status::of(head >> 4)
+    fn shaft(&self) -> Shaft {
+        let is_heard = self.status.is_some();
+        let unheard = (None, AngularVelocity::ZERO);
+        if is_heard { Feedback::shaft(&self.report, self.model.ranges()) } else { unheard }
     }
 
     const fn command_id(&self) -> u16 {
@@ -173,19 +179,19 @@ impl DriveProtocol for Motor {
         if head & 0xF != self.id {
             return Ingest::Unrelated;
         }
-        if Status::of(head >> 4).is_none() {
+        let Some(status) = Status::of(head >> 4) else {
             return Ingest::WrongField;
-        }
-        self.report = *data;
+        };
+        (self.status, self.report) = (Some(status), *data);
         Ingest::Taken
     }
 
     fn velocity(&self) -> AngularVelocity {
-        self.feedback().map_or(AngularVelocity::ZERO, |drive| drive.measured.velocity())
+        self.shaft().1
     }
 
     fn angle(&self) -> Option<Angle> {
-        self.feedback()?.angle()
+        self.shaft().0
     }
 
     fn rest(&mut self) -> CanFrame {
@@ -198,9 +204,8 @@ impl DriveProtocol for Motor {
     }
 
     fn control(&mut self, order: Order) -> CanFrame {
-        let command =
-            self.feedback().and_then(|drive| self.mode.command(order, &drive, &self.model));
-        match command {
+        let report = self.status.map(|_| &self.report);
+        match report.and_then(|report| self.mode.command(order, report, &self.model)) {
             Some(data) => self.frame_of(data),
             None => self.rest(),
         }
@@ -240,7 +245,7 @@ impl DriveProtocol for Motor {
     }
 
     fn is_enabled(&self) -> Option<bool> {
-        self.status().map(|status| status == Status::Enabled)
+        self.status.map(|status| status == Status::Enabled)
     }
 
     fn inquire(&mut self) -> Option<CanFrame> {
@@ -273,15 +278,17 @@ impl DriveProtocol for Motor {
     }
 
     fn vitals(&self) -> Vitals {
-        let Some(drive) = self.feedback() else { return Vitals::default() };
+        let Some(status) = self.status else { return Vitals::default() };
+        let [_, a, b, c, d, e, driver_c, rotor_c] = self.report;
+        let measured = self.model.ranges().decode_feedback(&[a, b, c, d, e]);
         Vitals {
-            temperature_c: Some(drive.driver_c.max(drive.rotor_c).into()),
-            has_fault: drive.status.is_error(),
+            temperature_c: Some(driver_c.max(rotor_c).into()),
+            has_fault: status.is_error(),
             has_warning: false,
-            error_code: drive.status.error_code(),
+            error_code: status.error_code(),
             effort: self.mode.0.effort(),
-            speed: drive.measured.velocity_rad_per_s / self.model.vmax_rad_per_s(),
-            current: drive.measured.torque_nm / self.model.tmax_nm(),
+            speed: measured.velocity_rad_per_s / self.model.vmax_rad_per_s(),
+            current: measured.torque_nm / self.model.tmax_nm(),
         }
     }
 }
@@ -289,7 +296,7 @@ impl DriveProtocol for Motor {
 impl Motor {
     /// Disables the drive. If the drive reports an error, each second pair of frames clears the error, and the drive stays disabled.
     fn off(&mut self) -> CanFrame {
-        let has_error = self.status().is_some_and(Status::is_error);
+        let has_error = self.status.is_some_and(Status::is_error);
         let clears = has_error && self.specials & 2 != 0;
         self.special(if clears { CLEAR_ERROR } else { mit::DISABLE })
     }

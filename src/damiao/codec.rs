@@ -3,7 +3,7 @@
 use super::Register;
 use crate::frame::{CanFrame, standard_id};
 use crate::motor::Impedance;
-use crate::motor::Inquiry;
+use crate::motor::{Inquiry, Shaft};
 use crate::units::Angle;
 use crate::wire::mit;
 use crate::wire::mit::Ranges;
@@ -139,16 +139,30 @@ impl Feedback {
         if self.is_at_end { None } else { Some(Angle::from_radians(self.measured.position_rad)) }
     }
 
+    /// Reads angle and velocity alone.
+    #[inline]
+    pub(super) const fn shaft(data: &[u8; 8], ranges: &Ranges) -> Shaft {
+        let [_, a, b, c, d, e, ..] = *data;
+        let measured = ranges.decode_feedback(&[a, b, c, d, e]);
+        let is_at_end = is_end([a, b]);
+        let angle = if is_at_end { None } else { Some(Angle::from_radians(measured.position_rad)) };
+        (angle, measured.velocity())
+    }
+
     /// Reads a feedback frame; `None` for an unknown status.
     #[must_use]
     #[inline]
     pub const fn decode(data: &[u8; 8], ranges: &Ranges) -> Option<Self> {
         let [head, a, b, c, d, e, driver_c, rotor_c] = *data;
         let Some(status) = Status::of(head >> 4) else { return None };
-        let is_at_end = matches!([a, b], [0, 0] | [0xFF, 0xFF]);
+        let is_at_end = is_end([a, b]);
         let measured = ranges.decode_feedback(&[a, b, c, d, e]);
         Some(Self { status, id: head & 0xF, measured, is_at_end, driver_c, rotor_c })
     }
+}
+
+const fn is_end(position: [u8; 2]) -> bool {
+    matches!(position, [0, 0] | [0xFF, 0xFF])
 }
 
 /// The state of a drive: the upper half of the first byte of its feedback.

@@ -77,16 +77,17 @@ impl Mode {
     pub(super) fn command(
         &mut self,
         order: Order,
-        drive: &Feedback,
+        report: &[u8; 8],
         model: &Model,
     ) -> Option<[u8; 8]> {
-        let shaft = (drive.angle(), drive.measured.velocity());
+        let shaft = || Feedback::shaft(report, model.ranges());
         let command = match self.0.impedance_goal(order, shaft, model.ranges(), 4_095)? {
             Goal::Torque(torque_nm) => return Some(model.ranges().encode_torque(torque_nm)),
             Goal::Impedance(command) => Command::Mit(command),
             Goal::Velocity(velocity) => Command::Velocity(velocity),
             Goal::Way(way) => {
-                let position = inside(drive.measured.position_rad, way, model.pmax_rad());
+                let position = Feedback::decode(report, model.ranges())?.measured.position_rad;
+                let position = inside(position, way, model.pmax_rad());
                 self.toward(position, order.share, model)
             }
         };

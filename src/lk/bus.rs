@@ -218,7 +218,7 @@ impl DriveProtocol for Motor {
     fn control(&mut self, order: Order) -> CanFrame {
         let needs_angle = self.mode.0.is_angle();
         let (shaft, scale) = ((self.angle(), self.velocity()), self.model.scale());
-        let goal = self.mode.0.goal(order, shaft, scale.max_velocity);
+        let goal = self.mode.0.goal(order, || shaft, scale.max_velocity);
         let limit = self.mode.limit(order.share, &scale);
         let command = goal.and_then(|goal| self.command(goal, limit)).unwrap_or(Command::REST);
         self.silent = if needs_angle { self.silent.saturating_add(1) } else { 0 };

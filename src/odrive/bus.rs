@@ -104,7 +104,7 @@ impl DriveProtocol for Motor {
             return self.modes();
         }
         let shaft = (self.angle(), self.velocity());
-        match self.mode.control.goal(order, shaft, f32::MAX) {
+        match self.mode.control.goal(order, || shaft, f32::MAX) {
             Some(goal) => self.follow(goal, &drive),
             None => self.rest(),
         }

@@ -139,7 +139,7 @@ impl DriveProtocol for Motor {
             track.advance(way, drive.angle_deg);
         }
         let (shaft, scale) = ((self.angle(), self.velocity()), self.model.scale());
-        let goal = self.mode.0.goal(order, shaft, scale.max_velocity);
+        let goal = self.mode.0.goal(order, || shaft, scale.max_velocity);
         let limit = self.mode.limit(order.share, &scale);
         self.last = goal.and_then(|goal| self.command(goal, limit)).unwrap_or(Command::REST);
         self.silent = self.silent.saturating_add(self.mode.0.is_angle().into());

@@ -105,7 +105,7 @@ impl Mode {
 
     /// Returns the command to the drive within the share of its largest effort; `None` to rest.
     pub(super) fn command(&mut self, order: Order, shaft: Shaft, model: &Model) -> Option<Command> {
-        let goal = self.control.impedance_goal(order, shaft, model.ranges(), 65_535)?;
+        let goal = self.control.impedance_goal(order, || shaft, model.ranges(), 65_535)?;
         Some(match goal {
             Goal::Impedance(command) => Command::Operation(command),
             Goal::Torque(torque_nm) if self.control.is_impedance() => {

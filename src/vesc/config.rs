@@ -88,12 +88,12 @@ impl CurrentControl {
         let wanted = match (order.target, &mut self.loops) {
             (Target::Torque(torque), loops) => {
                 if let Some(loops) = loops {
-                    loops.step(&order, (at.angle, at.velocity), limit);
+                    loops.step(&order, || (at.angle, at.velocity), limit);
                 }
                 torque
             }
             (Target::Angle(_), _) if !self.has_angle => return None,
-            (_, loops) => loops.as_mut()?.step(&order, (at.angle, at.velocity), limit)?,
+            (_, loops) => loops.as_mut()?.step(&order, || (at.angle, at.velocity), limit)?,
         };
         let torque = kept(wanted, limit);
         // Rounding of the quotient must not take it past the limit.

@@ -27,7 +27,9 @@ impl<M: DriveProtocol> CanDevice for Actuator<M> {
         let (step, now) = (TimeStep::of_motor(tick.dt_s()), tick.now());
         let goes_on = self.is_steady && !step.is_hold() && self.goes_on(now);
         if goes_on || self.decide(step, now) {
-            self.withdraw();
+            if self.offered.waits {
+                self.withdraw();
+            }
             let target = *if goes_on { &self.target } else { &self.goal };
             let frame = Some(self.motor.control(Order { target, share: self.share, step }));
             self.offered = Offered { frame, waits: true, may_repeat: Repeat::ONCE, is_rest: false };

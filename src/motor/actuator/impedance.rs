@@ -128,15 +128,19 @@ impl ImpedanceControl {
         count: &Impedance,
     ) -> Option<Impedance> {
         let shaft = (angle, velocity);
-        match self.torque_alone(&order, shaft) {
+        match self.torque_alone(&order, || shaft) {
             Some(torque_nm) => Some(Impedance::torque(torque_nm)),
-            None => self.spring(&order, shaft, most, count),
+            None => self.spring(order, shaft, most, count),
         }
     }
 
     /// Returns the torque of a target that needs neither spring nor damper: a torque, or a velocity or an angle by our own loops.
     #[inline(always)]
-    pub(crate) fn torque_alone(&mut self, order: &Order, shaft: Shaft) -> Option<f32> {
+    pub(crate) fn torque_alone(
+        &mut self,
+        order: &Order,
+        shaft: impl FnOnce() -> Shaft,
+    ) -> Option<f32> {
         let limit = self.torque_limit_nm * order.share;
         let looped = self.loops.as_mut().and_then(|loops| loops.step(order, shaft, limit));
         let wanted = match order.target {
@@ -152,7 +156,7 @@ impl ImpedanceControl {
     #[inline(never)]
     pub(crate) fn spring(
         &mut self,
-        order: &Order,
+        order: Order,
         shaft: Shaft,
         most: &Impedance,
         count: &Impedance,
@@ -160,7 +164,7 @@ impl ImpedanceControl {
         self.effort = 0.0;
         let (limit, share, (angle, velocity)) =
             (self.torque_limit_nm * order.share, order.share, shaft);
-        let wanted = self.wanted(order, angle)?;
+        let wanted = self.wanted(&order, angle)?;
         let torque_nm = limited(wanted.torque_nm, -limit, limit);
         if wanted.stiffness <= 0.0 && wanted.damping <= 0.0 {
             self.effort = torque_nm / self.torque_limit_nm;
@@ -207,17 +211,17 @@ impl ImpedanceControl {
     pub(crate) fn torque(
         &mut self,
         order: &Order,
-        shaft: Shaft,
+        shaft: impl Fn() -> Shaft,
         most_velocity: f32,
     ) -> Option<f32> {
-        match self.torque_alone(order, shaft) {
+        match self.torque_alone(order, &shaft) {
             Some(torque_nm) => Some(torque_nm),
-            None => self.torque_of_spring(order, shaft, most_velocity),
+            None => self.torque_of_spring(*order, shaft(), most_velocity),
         }
     }
 
     #[inline(never)]
-    fn torque_of_spring(&mut self, order: &Order, shaft: Shaft, most_velocity: f32) -> Option<f32> {
+    fn torque_of_spring(&mut self, order: Order, shaft: Shaft, most_velocity: f32) -> Option<f32> {
         let most = Impedance {
             angle: Angle::from_radians(UNLIMITED),
             velocity: AngularVelocity::from_rad_per_s(most_velocity),
@@ -319,23 +323,24 @@ impl TorqueLoops {
     pub(crate) fn step(
         &mut self,
         order: &Order,
-        (angle, velocity): Shaft,
+        shaft: impl FnOnce() -> Shaft,
         limit_nm: f32,
     ) -> Option<f32> {
-        let velocity = velocity.as_rad_per_s();
         let torque_nm = match order.target {
             Target::Velocity(target) => {
+                let velocity = shaft().1.as_rad_per_s();
                 if !matches!(self.before, Before::Velocity) {
                     self.take_over(Before::Velocity, velocity);
                 }
                 self.speed.step(target.as_rad_per_s(), velocity, &order.step)
             }
             Target::Angle(target) => {
-                let way = wrap_pi((target - angle?).as_radians());
+                let (angle, velocity) = shaft();
+                let (way, velocity) = ((target - angle?).as_radians(), velocity.as_rad_per_s());
                 if !matches!(self.before, Before::Angle) {
                     self.take_over(Before::Angle, velocity);
                 }
-                let wanted = self.position.step_error(way, velocity, &order.step);
+                let wanted = self.position.step_error(wrap_pi(way), velocity, &order.step);
                 self.speed.step(wanted, velocity, &order.step)
             }
             Target::Torque(torque_nm) => {
@@ -387,7 +392,7 @@ mod tests {
         let loops = TorqueLoops::new(position, PidConfig::new(0.5, 20.0, 0.0)).unwrap();
         let step = |loops: &mut TorqueLoops, target| {
             let order = Order { target, share: 1.0, step: TimeStep::of(0.001) };
-            loops.step(&order, (Some(Angle::ZERO), AngularVelocity::ZERO), LIMIT_NM)
+            loops.step(&order, || (Some(Angle::ZERO), AngularVelocity::ZERO), LIMIT_NM)
         };
         (loops, step)
     }

@@ -147,10 +147,15 @@ impl ControlMode {
 
     /// Returns the goal of a drive that follows torques; `None` to rest. The velocity of the shaft is known up to so many rad/s.
     #[inline]
-    pub(crate) fn goal(&mut self, order: Order, shaft: Shaft, known: f32) -> Option<Goal> {
+    pub(crate) fn goal(
+        &mut self,
+        order: Order,
+        shaft: impl Fn() -> Shaft,
+        known: f32,
+    ) -> Option<Goal> {
         match &mut self.follows {
             Follows::Impedance(control) => control.torque(&order, shaft, known).map(Goal::Torque),
-            _ => self.own_goal(order, shaft),
+            _ => self.own_goal(order, shaft()),
         }
     }
 
@@ -160,19 +165,19 @@ impl ControlMode {
     pub(crate) fn impedance_goal(
         &mut self,
         order: Order,
-        shaft: Shaft,
+        shaft: impl Fn() -> Shaft,
         ranges: &Ranges,
         top: u16,
     ) -> Option<Goal> {
         match &mut self.follows {
-            Follows::Impedance(control) => match control.torque_alone(&order, shaft) {
+            Follows::Impedance(control) => match control.torque_alone(&order, &shaft) {
                 Some(torque_nm) => Some(Goal::Torque(torque_nm)),
                 None => {
                     let (most, count) = (Impedance::most(ranges), Impedance::count(ranges, top));
-                    control.spring(&order, shaft, &most, &count).map(Goal::Impedance)
+                    control.spring(order, shaft(), &most, &count).map(Goal::Impedance)
                 }
             },
-            _ => self.own_goal(order, shaft),
+            _ => self.own_goal(order, shaft()),
         }
     }
 
