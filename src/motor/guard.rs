@@ -186,6 +186,9 @@ impl Guard {
     #[cold]
     #[inline(never)]
     fn compare_ages(&mut self, before: Instant, now: Instant) -> bool {
+        if self.device.prolong(before, &self.motor) {
+            return true;
+        }
         if !self.device.moves_on(before) {
             self.end_without_time(before, now);
             return false;

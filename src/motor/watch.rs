@@ -119,29 +119,41 @@ impl Watch {
         if is_well && now < self.next {
             return self.share;
         }
-        self.check_all(guard, &vitals(), now)
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn check_all(&mut self, guard: &mut Guard, vitals: &Vitals, now: Instant) -> f32 {
-        let before = guard.conditions();
+        let vitals = vitals();
         self.traffic.add(guard.take_in_time());
         if self.traffic.end_window(&mut self.window_from, now) {
             guard.trust(0);
         }
+        let is_online = guard.link() == Link::Online;
+        let slow = if is_online { self.begin_slow(guard.is_armed(), &vitals, now) } else { None };
+        if is_well && slow.is_some_and(|sample| self.monitor.passes(&sample, self.config)) {
+            self.share = 1.0;
+            return self.share;
+        }
+        self.check_all(guard, &vitals, slow.as_ref(), now)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn check_all(
+        &mut self,
+        guard: &mut Guard,
+        vitals: &Vitals,
+        slow: Option<&Sample>,
+        now: Instant,
+    ) -> f32 {
+        let before = guard.conditions();
         self.rival.check(now);
         let has_rival = self.has_rival();
         if guard.link() != Link::Online {
             self.monitor = Monitor::NEW;
             guard.note(Condition::SecondMaster, has_rival, now);
         } else {
-            let slow = self.begin_slow(guard.is_armed(), vitals, now);
             guard.latch(now, |latch| {
                 latch.set(Condition::SecondMaster, has_rival);
                 self.read_error(latch, vitals);
                 if let Some(sample) = slow {
-                    self.share = self.monitor.check(latch, &sample, self.config);
+                    self.share = self.monitor.check(latch, sample, self.config);
                 }
             });
         }
@@ -152,6 +164,7 @@ impl Watch {
     }
 
     /// Returns the slow quantities, if their check is due.
+    #[inline]
     fn begin_slow(&mut self, is_armed: bool, vitals: &Vitals, now: Instant) -> Option<Sample> {
         let since = now.since(self.checked);
         if since < PERIOD {

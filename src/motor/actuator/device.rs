@@ -30,7 +30,7 @@ impl<M: DriveProtocol> CanDevice for Actuator<M> {
             if self.offered.waits {
                 self.withdraw();
             }
-            let target = *if goes_on { &self.target } else { &self.goal };
+            let target = *if self.is_narrowed { &self.goal } else { &self.target };
             let frame = Some(self.motor.control(Order { target, share: self.share, step }));
             self.offered = Offered { frame, waits: true, may_repeat: Repeat::ONCE, is_rest: false };
             self.has_frames = true;

@@ -58,7 +58,8 @@ pub struct Actuator<M> {
     power: Power,
     /// In the direction of the drive, as all below.
     target: Target,
-    /// What the drive is told of the target: less while the output range opens, and at a soft limit.
+    /// The drive is told the goal, less than the target: while the output range opens, and at a soft limit.
+    is_narrowed: bool,
     goal: Target,
     /// The share of the output that is left.
     share: f32,
@@ -101,6 +102,7 @@ impl<M: DriveProtocol> Actuator<M> {
             watch: Watch::new(),
             power: Power::NEW,
             target: Target::Torque(0.0),
+            is_narrowed: false,
             goal: Target::Torque(0.0),
             share: 0.0,
             start: Start::NONE,

@@ -167,22 +167,27 @@ impl<M: DriveProtocol> Actuator<M> {
         self.power.is_steady() && !waits
     }
 
-    /// Finds the goal, as far as the output range is open and within the soft limits, and the share of the output, of which the conditions
-    /// leave so much.
+    /// Finds what the drive is told of the target, and the share of the output, of which the conditions leave so much.
     fn follow(&mut self, left: f32) {
         self.is_resting = false;
         let opened = self.guard.share();
-        let is_free = opened >= 1.0 && self.watch.soft_limits().is_none();
-        let is_well = self.watch.is_well() && self.guard.conditions().is_empty();
-        self.is_steady = is_free && is_well && self.has_nothing_due();
-        if is_free {
-            self.guard.wake_at(self.watch.next());
-            (self.goal, self.share) = (self.target, left);
+        self.is_narrowed = opened < 1.0 || self.watch.soft_limits().is_some();
+        if self.is_narrowed {
+            self.share = if left < opened { left } else { opened };
+            self.narrow(opened);
             return;
         }
+        self.share = left;
+        let is_well = self.watch.is_well() && self.guard.conditions().is_empty();
+        self.is_steady = is_well && self.has_nothing_due();
+        self.guard.wake_at(self.watch.next());
+    }
+
+    /// Finds the goal on the way from the start, as far as the output range is open, and within the soft limits.
+    #[inline(never)]
+    fn narrow(&mut self, opened: f32) {
         let (shaft, inside) = self.shaft();
         self.goal = self.start.goal(self.target, opened, shaft, inside);
-        self.share = if left < opened { left } else { opened };
     }
 
     /// Checks the health of the motor and takes the reactions, which may relax the motor; returns the share of the output left.

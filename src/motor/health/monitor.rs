@@ -119,6 +119,22 @@ impl Monitor {
         true
     }
 
+    /// As [`check`](Self::check), for a motor without a condition, whose feedback is not compared with the feedback before. Returns `false`,
+    /// without a change, if a condition may begin.
+    #[inline]
+    pub(crate) fn passes(&mut self, sample: &Sample, config: &HealthConfig) -> bool {
+        let is_cool = sample.temperature.is_none_or(|(celsius, (warning, _))| celsius < warning);
+        let is_other = stalls(sample, config)
+            || Runaway::is_wrong(sample)
+            || sample.speed.abs() > 2.0
+            || sample.fresh;
+        if !is_cool || is_other {
+            return false;
+        }
+        (self.stall, self.runaway) = (Timer::ZERO, Runaway::NONE);
+        true
+    }
+
     /// Begins anew as a motor is armed: a condition that still holds begins again, and relaxes the motor again.
     pub(crate) fn start(&mut self, latch: &mut Latch) {
         for condition in [Condition::Runaway, Condition::Stalled, Condition::Overspeed] {
@@ -261,12 +277,17 @@ impl Runaway {
     /// * without a command, while the *current* drives the motor: the ESC follows another controller, or no controller. Without the current
     ///   an external force pushes the motor, which is no fault of the motor.
     fn check(&mut self, latch: &mut Latch, sample: &Sample) {
-        let effort = sample.effort * 1.0_f32.copysign(sample.speed);
-        let current = sample.current * 1.0_f32.copysign(sample.speed);
-        let wrong = effort <= -0.5 || (effort.abs() < UNDRIVEN && current >= 0.2);
-        if self.holds(sample.speed, wrong, sample.elapsed) {
+        if self.holds(sample.speed, Self::is_wrong(sample), sample.elapsed) {
             latch.set(Condition::Runaway, true);
         }
+    }
+
+    /// Tells whether command and current oppose a rise of the speed.
+    #[inline]
+    fn is_wrong(sample: &Sample) -> bool {
+        let effort = sample.effort * 1.0_f32.copysign(sample.speed);
+        let current = sample.current * 1.0_f32.copysign(sample.speed);
+        effort <= -0.5 || (effort.abs() < UNDRIVEN && current >= 0.2)
     }
 
     /// Takes a speed, and whether command and current oppose a rise (`wrong`). Returns whether the motor runs away.
@@ -316,11 +337,17 @@ fn check_stall(
         let least = if pushed < hold { pushed } else { hold };
         effort > 0.0 && effort >= 0.5 * least && speed < 2.0 * config.stall_speed()
     } else {
-        let holds = effort >= config.stall_effort() && speed <= config.stall_speed();
+        let holds = stalls(sample, config);
         timer.run(holds, sample.elapsed) >= config.stall_window() && holds
     };
     latch.set(Condition::Stalled, stalled);
     if stalled { config.stall_hold() } else { 1.0 }
+}
+
+/// Tells whether a motor is driven and does not turn.
+#[inline]
+fn stalls(sample: &Sample, config: &HealthConfig) -> bool {
+    sample.effort.abs() >= config.stall_effort() && sample.speed.abs() <= config.stall_speed()
 }
 
 /// A condition ends this far below the temperature of its begin.
