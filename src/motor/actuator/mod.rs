@@ -49,31 +49,33 @@ const INQUIRY: Duration = Duration::from_millis(10);
 /// Each update offers a command or the frame of rest. If the drive is to be enabled or disabled, the frame for that comes first.
 /// [`DriveProtocol`] has an example.
 #[derive(Debug, Clone, Copy)]
+// In the order of use, so that one tick reads neighbours.
+#[repr(C)]
 pub struct Actuator<M> {
-    motor: M,
-    joint: Joint,
-    route: Route,
     guard: Guard,
-    watch: Watch,
     power: Power,
-    /// In the direction of the drive, as all below.
-    target: Target,
-    /// The drive is told the goal, less than the target: while the output range opens, and at a soft limit.
-    is_narrowed: bool,
-    goal: Target,
-    /// The share of the output that is left.
-    share: f32,
-    start: Start,
     /// The last update drove the motor, and as long as its rules have nothing to change, the next one is to do the same.
     is_steady: bool,
-    is_resting: bool,
+    /// The drive is told the goal, less than the target: while the output range opens, and at a soft limit.
+    is_narrowed: bool,
     /// A frame may wait to be sent.
     has_frames: bool,
+    is_resting: bool,
+    /// The share of the output that is left.
+    share: f32,
+    /// In the direction of the drive, as all below.
+    target: Target,
     offered: Offered,
     /// The last frame taken, but for the drive's power.
     last: Option<CanFrame>,
     /// A frame for the drive's power, waiting to be sent before the other.
     switching: Option<CanFrame>,
+    route: Route,
+    motor: M,
+    joint: Joint,
+    watch: Watch,
+    goal: Target,
+    start: Start,
     /// This update offers a frame for the drive's power.
     has_posted: bool,
     was_online: bool,
