@@ -3,19 +3,24 @@
 #![cfg(test)]
 
 use drivetrain::control::PidConfig;
+use drivetrain::encoder::GearRatio;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
     Actuator, AngleDrive, Devices, DriveProtocol, HealthConfig, ImpedanceControl, Timeouts,
     VelocityDrive,
 };
-use drivetrain::sim::{DamiaoDrive, Drive, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive};
+use drivetrain::sim::{
+    DamiaoDrive, Drive, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive,
+};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
-use drivetrain::{damiao, lk, odrive, rmd, robstride};
+use drivetrain::{damiao, lk, odrive, rmd, robstride, vesc};
 use std::collections::VecDeque;
 use std::fmt::Debug;
 
-static HEALTH: HealthConfig = HealthConfig::new().with_temperatures(60, 80);
+static FREE: HealthConfig = HealthConfig::new().with_temperatures(60, 80);
+static LIMITED: HealthConfig =
+    FREE.with_soft_limits(Angle::from_degrees(-90.0), Angle::from_degrees(90.0));
 
 struct Random(u32);
 
@@ -36,6 +41,7 @@ struct Twins<M, D> {
     one: Actuator<M>,
     other: Actuator<M>,
     timeouts: Timeouts,
+    health: &'static HealthConfig,
     drive: D,
     answers: VecDeque<CanFrame>,
     now: u64,
@@ -45,13 +51,24 @@ struct Twins<M, D> {
 
 impl<M: DriveProtocol + Copy + Debug, D: Drive> Twins<M, D> {
     fn new(motor: M, drive: D, timeouts: Timeouts, seed: u32) -> Self {
-        let one = Actuator::new(motor).with_timeouts(timeouts).with_health(&HEALTH).unwrap();
+        let health = if seed % 3 == 0 { &LIMITED } else { &FREE };
+        let one = Actuator::new(motor).with_timeouts(timeouts).with_health(health).unwrap();
         let (answers, random) = (VecDeque::new(), Random(seed));
-        Self { one, other: one, timeouts, drive, answers, now: 5_000_000, random, driven: 0 }
+        Self {
+            one,
+            other: one,
+            timeouts,
+            health,
+            drive,
+            answers,
+            now: 5_000_000,
+            random,
+            driven: 0,
+        }
     }
 
     fn both<T: PartialEq + Debug>(&mut self, call: impl Fn(&mut Actuator<M>) -> T) -> T {
-        self.other = self.other.with_timeouts(self.timeouts).with_health(&HEALTH).unwrap();
+        self.other = self.other.with_timeouts(self.timeouts).with_health(self.health).unwrap();
         let (one, other) = (call(&mut self.one), call(&mut self.other));
         assert_eq!(one, other, "at {} us", self.now);
         one
@@ -203,5 +220,41 @@ fn odrive() {
         let drive = OdriveDrive::new(1, true, model.torque_constant(), 1.0);
         let motor = odrive::Motor::new(model, firmware, 1, fastest, control()).unwrap();
         (motor, drive.with_periods(0.1, 0.001))
+    });
+}
+
+/// A VESC and whether it has reported in this cycle.
+struct Reporting(VescDrive, bool);
+
+impl Drive for Reporting {
+    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
+        self.0.hear(frame)
+    }
+
+    fn step(&mut self, dt_s: f32) {
+        self.0.step(dt_s);
+        self.1 = false;
+    }
+
+    fn next_frame(&mut self) -> Option<CanFrame> {
+        let is_due = !std::mem::replace(&mut self.1, true);
+        self.0.report(9).filter(|_| is_due)
+    }
+}
+
+#[test]
+fn vesc() {
+    let model = vesc::Model {
+        name: "hub",
+        pole_pairs: 15,
+        gear: GearRatio::DIRECT,
+        torque_constant_nm_per_a: 0.5,
+        current_limit_a: 20.0,
+        max_velocity: AngularVelocity::from_rpm(500.0),
+    };
+    let mode = vesc::Mode::current_with_speed_loop(PidConfig::new(0.8, 4.0, 0.001)).unwrap();
+    compare(|| {
+        let drive = Reporting(VescDrive::of(model, 1), false);
+        (vesc::Motor::new(model, 1, mode).unwrap(), drive)
     });
 }

@@ -214,14 +214,19 @@ impl ImpedanceControl {
         shaft: impl Fn() -> Shaft,
         most_velocity: f32,
     ) -> Option<f32> {
-        match self.torque_alone(order, &shaft) {
-            Some(torque_nm) => Some(torque_nm),
-            None => self.torque_of_spring(*order, shaft(), most_velocity),
+        if self.torque_alone(order, &shaft).is_none() {
+            self.spring_alone(*order, shaft(), most_velocity)?;
         }
+        let limit = self.torque_limit_nm * order.share;
+        Some(limited(self.effort * self.torque_limit_nm, -limit, limit))
     }
 
-    #[inline(never)]
-    fn torque_of_spring(&mut self, order: Order, shaft: Shaft, most_velocity: f32) -> Option<f32> {
+    fn spring_alone(
+        &mut self,
+        order: Order,
+        shaft: Shaft,
+        most_velocity: f32,
+    ) -> Option<Impedance> {
         let most = Impedance {
             angle: Angle::from_radians(UNLIMITED),
             velocity: AngularVelocity::from_rad_per_s(most_velocity),
@@ -229,9 +234,7 @@ impl ImpedanceControl {
             damping: UNLIMITED,
             torque_nm: self.torque_limit_nm,
         };
-        self.spring(order, shaft, &most, &Impedance::FREE)?;
-        let limit = self.torque_limit_nm * order.share;
-        Some(limited(self.effort * self.torque_limit_nm, -limit, limit))
+        self.spring(order, shaft, &most, &Impedance::FREE)
     }
 
     /// Brings the loops to rest.
