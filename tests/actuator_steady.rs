@@ -51,7 +51,7 @@ struct Twins<M, D> {
 
 impl<M: DriveProtocol + Copy + Debug, D: Drive> Twins<M, D> {
     fn new(motor: M, drive: D, timeouts: Timeouts, seed: u32) -> Self {
-        let health = if seed % 3 == 0 { &LIMITED } else { &FREE };
+        let health = if seed.is_multiple_of(3) { &LIMITED } else { &FREE };
         let one = Actuator::new(motor).with_timeouts(timeouts).with_health(health).unwrap();
         let (answers, random) = (VecDeque::new(), Random(seed));
         Self {
@@ -177,8 +177,8 @@ fn compare<M: DriveProtocol + Copy + Debug, D: Drive>(make: impl Fn() -> (M, D))
         .with_feedback(Duration::from_millis(40), Duration::from_millis(400))
         .unwrap();
     let mut driven = 0.0;
-    for seed in 0..40 {
-        let timeouts = if seed % 2 == 0 { Timeouts::new() } else { polled };
+    for seed in 0..40_u32 {
+        let timeouts = if seed.is_multiple_of(2) { Timeouts::new() } else { polled };
         let (motor, drive) = make();
         driven += Twins::new(motor, drive, timeouts, seed * 977 + 1).run(5_000) / 40.0;
     }
