@@ -58,7 +58,6 @@ mod shaping;
 pub mod state_space;
 mod tuning;
 
-pub(crate) use actuator::Cascade;
 pub use actuator::{PositionActuator, SpeedActuator};
 pub use differentiator::{Differentiator, fhan};
 pub use filter::{Biquad, LowPass, Window};

@@ -7,11 +7,9 @@
 //!                                                                     |
 //!                    speed -> low-pass ------------------------> PID -+-> low-pass -> output
 //! ```
-//! The two PIDs of the latter are a `Cascade`, used without filters by an actuator.
 
 mod position;
 
-pub(crate) use position::Cascade;
 pub use position::PositionActuator;
 
 use super::filter::LowPass;

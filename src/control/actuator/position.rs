@@ -38,7 +38,8 @@ use crate::time::TimeStep;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PositionActuator {
     filter: OptionalFilter,
-    cascade: Cascade,
+    position: Pid,
+    speed: Pid,
     filters: SpeedFilters,
     /// Since the last step of the angle loop.
     passed_s: f32,
@@ -58,9 +59,10 @@ impl PositionActuator {
     pub const fn new(angle: PidConfig, mut speed: SpeedActuator) -> Result<Self, ConfigError> {
         speed.reset();
         match Pid::new(angle) {
-            Ok(angle) => Ok(Self {
+            Ok(position) => Ok(Self {
                 filter: OptionalFilter(None),
-                cascade: Cascade::of(angle, speed.pid),
+                position,
+                speed: speed.pid,
                 filters: speed.filters,
                 passed_s: 0.0,
                 rejected: 0,
@@ -78,7 +80,7 @@ impl PositionActuator {
     /// Names `angle_filter` when the cut-off is NaN, infinite, zero or negative, and when the angle loop has a period: the mean of
     /// 359° and 1° is not 180°.
     pub const fn with_angle_filter(mut self, cutoff_hz: f32) -> Result<Self, ConfigError> {
-        if self.cascade.position().config().period() > 0.0 {
+        if self.position.config().period() > 0.0 {
             return Err(ConfigError::Conflict("angle_filter"));
         }
         match OptionalFilter::new("angle_filter", cutoff_hz) {
@@ -107,13 +109,13 @@ impl PositionActuator {
         if !step.admits(finite, &mut self.rejected) {
             if !step.is_hold() {
                 self.filter.reset();
-                self.cascade.position_mut().rest_derivative();
+                self.position.rest_derivative();
             }
             return self.miss(step);
         }
         let angle = self.filter.pass(angle, step);
         if let Some(outer) = self.outer_step(step) {
-            self.cascade.position_mut().step(setpoint, angle, &outer);
+            self.position.step(setpoint, angle, &outer);
         }
         self.step_speed(speed, step)
     }
@@ -127,7 +129,7 @@ impl PositionActuator {
             return self.miss(step); // the rate of the angle is given: none of it is missed
         }
         if let Some(outer) = self.outer_step(step) {
-            self.cascade.position_mut().step_error(error, speed, &outer);
+            self.position.step_error(error, speed, &outer);
         }
         self.step_speed(speed, step)
     }
@@ -135,7 +137,8 @@ impl PositionActuator {
     /// Forgets everything but the configuration and the count of rejected steps.
     pub const fn reset(&mut self) {
         self.filter.reset();
-        self.cascade.reset();
+        self.position.reset();
+        self.speed.reset();
         self.filters.reset();
         self.await_outer();
     }
@@ -157,15 +160,16 @@ impl PositionActuator {
     /// ```
     pub const fn reset_to(&mut self, output: f32) {
         self.reset();
-        self.cascade.speed_mut().reset_to(output);
-        self.filters.reset_to(self.cascade.output());
+        self.speed.reset_to(output);
+        self.filters.reset_to(self.speed.output());
     }
 
     /// Keeps the integrals of both loops over a gap in the measurements, as [`Pid::interrupt`](crate::control::Pid::interrupt) does; the
     /// next angle and the next speed pass their filters as first ones, and the angle loop runs with the next step.
     pub const fn interrupt(&mut self) {
         self.filter.reset();
-        self.cascade.interrupt();
+        self.position.interrupt();
+        self.speed.interrupt();
         self.filters.interrupt();
         self.await_outer();
     }
@@ -179,42 +183,42 @@ impl PositionActuator {
     /// Returns the last output of the angle loop.
     #[must_use]
     pub const fn speed_setpoint(&self) -> f32 {
-        self.cascade.position().output()
+        self.position.output()
     }
 
     /// Returns the position loop, for its terms and its configuration.
     #[must_use]
     pub const fn position(&self) -> &Pid {
-        self.cascade.position()
+        &self.position
     }
 
     /// Returns the position loop, for changing its gains.
     pub const fn position_mut(&mut self) -> &mut Pid {
-        self.cascade.position_mut()
+        &mut self.position
     }
 
     /// Returns the speed loop, for its terms and its configuration.
     #[must_use]
     pub const fn speed(&self) -> &Pid {
-        self.cascade.speed()
+        &self.speed
     }
 
     /// Returns the speed loop, for changing its gains.
     pub const fn speed_mut(&mut self) -> &mut Pid {
-        self.cascade.speed_mut()
+        &mut self.speed
     }
 
     /// Returns the number of refused steps, and of steps too long to be integrated; stays at 65535.
     #[must_use]
     pub const fn rejected(&self) -> u16 {
         // The speed loop runs in each admitted step, and refuses none of them.
-        self.rejected.saturating_add(self.cascade.speed().rejected())
+        self.rejected.saturating_add(self.speed.rejected())
     }
 
     /// The measured speed is too old at this step: its filter takes the next speed as a first value, and D rests.
     const fn miss(&mut self, step: &TimeStep) -> f32 {
         if !step.is_hold() {
-            self.cascade.speed_mut().rest_derivative();
+            self.speed.rest_derivative();
         }
         self.filters.miss(step);
         self.output()
@@ -222,7 +226,7 @@ impl PositionActuator {
 
     fn step_speed(&mut self, speed: f32, step: &TimeStep) -> f32 {
         let wanted = self.speed_setpoint();
-        self.filters.around(self.cascade.speed_mut(), wanted, speed, step)
+        self.filters.around(&mut self.speed, wanted, speed, step)
     }
 
     /// Has the angle loop run with the next step.
@@ -247,91 +251,6 @@ impl PositionActuator {
         self.await_outer();
         self.until_outer = self.outer_divider - 1;
         Some(outer)
-    }
-}
-
-/// A position loop over a speed loop: the position error becomes a velocity, and the velocity an effort.
-///
-/// ```text
-/// error, velocity -> PID -> velocity wanted -+
-///                                            +-> PID -> output
-/// velocity ----------------------------------+
-/// ```
-/// Errors are formed elsewhere: from integers, or on a circle. The measured velocity is the rate of the position loop, so a
-/// positive `kd` damps, and its output limit is the speed limit. Each input acts as on the two loops one after the other.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub(crate) struct Cascade {
-    speed: Pid,
-    position: Pid,
-}
-
-impl Cascade {
-    /// Takes the position loop, whose output is the setpoint of the speed loop, and the speed loop.
-    ///
-    /// # Errors
-    /// Names the parameter of a loop as [`Pid::new`] does.
-    pub(crate) const fn new(position: PidConfig, speed: PidConfig) -> Result<Self, ConfigError> {
-        match (Pid::new(position), Pid::new(speed)) {
-            (Ok(position), Ok(speed)) => Ok(Self { speed, position }),
-            (Err(error), _) | (_, Err(error)) => Err(error),
-        }
-    }
-
-    const fn of(position: Pid, speed: Pid) -> Self {
-        Self { speed, position }
-    }
-
-    /// Steps both loops and returns the output.
-    #[inline]
-    pub(crate) fn step(&mut self, error: f32, velocity: f32, step: &TimeStep) -> f32 {
-        let wanted = self.position.step_error(error, velocity, step);
-        self.speed.step(wanted, velocity, step)
-    }
-
-    /// Resets both loops: see [`Pid::reset`].
-    pub(crate) const fn reset(&mut self) {
-        self.position.reset();
-        self.speed.reset();
-    }
-
-    /// Keeps the integrals of both loops over a gap in the measurements: see [`Pid::interrupt`].
-    pub(crate) const fn interrupt(&mut self) {
-        self.position.interrupt();
-        self.speed.interrupt();
-    }
-
-    /// Returns the last output.
-    #[must_use]
-    #[inline]
-    pub(crate) const fn output(&self) -> f32 {
-        self.speed.output()
-    }
-
-    /// Returns the position loop, for its terms and its output.
-    #[must_use]
-    #[inline]
-    pub(crate) const fn position(&self) -> &Pid {
-        &self.position
-    }
-
-    /// Returns the position loop: to step it alone, to change its gains, to take over from another controller.
-    #[inline]
-    pub(crate) const fn position_mut(&mut self) -> &mut Pid {
-        &mut self.position
-    }
-
-    /// Returns the speed loop, for its terms and its output.
-    #[must_use]
-    #[inline]
-    pub(crate) const fn speed(&self) -> &Pid {
-        &self.speed
-    }
-
-    /// Returns the speed loop: to step it alone, to change its gains, to take over from another controller.
-    #[inline]
-    pub(crate) const fn speed_mut(&mut self) -> &mut Pid {
-        &mut self.speed
     }
 }
 
@@ -563,69 +482,47 @@ mod tests {
     const POSITION: PidConfig = PidConfig::new(10.0, 1.0, 0.1).with_output_limit(4.0);
     const SPEED: PidConfig = PidConfig::new(2.0, 5.0, 0.0).with_output_limit(20.0);
 
-    #[test]
-    fn a_cascade_equals_one_loop_after_the_other() {
-        let mut cascade = Cascade::new(POSITION, SPEED).unwrap();
-        let (mut position, mut speed) = (Pid::new(POSITION).unwrap(), Pid::new(SPEED).unwrap());
-        let bad = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
-        for sample in 0..50_u8 {
-            let (mut error, mut velocity) =
-                (1.0 - 0.02 * f32::from(sample), 0.1 * f32::from(sample));
-            match sample {
-                10..13 => error = bad[usize::from(sample) - 10],
-                30..33 => velocity = bad[usize::from(sample) - 30],
-                _ => {}
-            }
-            let step = TimeStep::of(match sample {
-                20 => 10.0,
-                40 => 0.0,
-                41 => f32::NAN,
-                _ => 0.001,
-            });
-            let wanted = position.step_error(error, velocity, &step);
-            let expected = speed.step(wanted, velocity, &step);
-            assert_eq!(cascade.step(error, velocity, &step), expected);
-        }
-        assert_eq!((cascade.position(), cascade.speed()), (&position, &speed));
+    fn by_error(position: PidConfig, speed: PidConfig) -> Result<PositionActuator, ConfigError> {
+        PositionActuator::new(position, SpeedActuator::new(speed)?)
     }
 
     #[test]
     fn an_interruption_keeps_both_integrals_and_a_reset_neither() {
-        let mut cascade = Cascade::new(POSITION, SPEED).unwrap();
+        let mut actuator = by_error(POSITION, SPEED).unwrap();
         for _ in 0..10 {
-            cascade.step(0.1, 0.0, &TimeStep::of(0.001));
+            actuator.step_error(0.1, 0.0, &TimeStep::of(0.001));
         }
-        let terms = (cascade.position().terms().i, cascade.speed().terms().i);
+        let terms = (actuator.position().terms().i, actuator.speed().terms().i);
         assert!(terms.0 > 0.0 && terms.1 > 0.0);
-        cascade.interrupt();
-        cascade.step(0.1, 0.5, &TimeStep::of(0.001));
-        assert_eq!((cascade.position().terms().i, cascade.speed().terms().i), terms);
-        cascade.reset();
-        assert_eq!(cascade, Cascade::new(POSITION, SPEED).unwrap());
+        actuator.interrupt();
+        actuator.step_error(0.1, 0.5, &TimeStep::of(0.001));
+        assert_eq!((actuator.position().terms().i, actuator.speed().terms().i), terms);
+        actuator.reset();
+        assert_eq!(actuator, by_error(POSITION, SPEED).unwrap());
     }
 
     #[test]
     fn the_position_loop_damps_from_the_first_call_on() {
-        let mut cascade = Cascade::new(POSITION, SPEED).unwrap();
-        cascade.step(0.1, 2.0, &TimeStep::of(0.001));
-        assert_eq!((cascade.position().terms().d, cascade.speed().terms().d), (-0.2, 0.0));
+        let mut actuator = by_error(POSITION, SPEED).unwrap();
+        actuator.step_error(0.1, 2.0, &TimeStep::of(0.001));
+        assert_eq!((actuator.position().terms().d, actuator.speed().terms().d), (-0.2, 0.0));
     }
 
     #[test]
     fn new_gains_of_one_loop_move_neither() {
-        let mut cascade = Cascade::new(POSITION, SPEED).unwrap();
+        let mut actuator = by_error(POSITION, SPEED).unwrap();
         let step = TimeStep::of(0.001);
-        cascade.step(0.1, 0.0, &step);
-        let before = cascade.step(0.1, 0.0, &step);
-        cascade.speed_mut().set_gains(3.0, 5.0, 0.0).unwrap();
-        cascade.position_mut().set_gains(12.0, 1.0, 0.1).unwrap();
-        assert!((cascade.step(0.1, 0.0, &step) - before).abs() < 0.02);
+        actuator.step_error(0.1, 0.0, &step);
+        let before = actuator.step_error(0.1, 0.0, &step);
+        actuator.speed_mut().set_gains(3.0, 5.0, 0.0).unwrap();
+        actuator.position_mut().set_gains(12.0, 1.0, 0.1).unwrap();
+        assert!((actuator.step_error(0.1, 0.0, &step) - before).abs() < 0.02);
     }
 
     #[test]
     fn the_invalid_loop_is_named_by_its_parameter() {
         let wrong = PidConfig::new(1.0, -1.0, 0.0);
-        assert_eq!(Cascade::new(wrong, SPEED).unwrap_err().parameter(), "ki");
-        assert_eq!(Cascade::new(POSITION, wrong).unwrap_err().parameter(), "ki");
+        assert_eq!(by_error(wrong, SPEED).unwrap_err().parameter(), "ki");
+        assert_eq!(by_error(POSITION, wrong).unwrap_err().parameter(), "ki");
     }
 }

@@ -76,7 +76,7 @@ impl ImpedanceControl {
     /// do not apply then.
     ///
     /// # Errors
-    /// As [`Cascade::new`](crate::control::Cascade::new).
+    /// As [`Pid::new`](crate::control::Pid::new).
     pub fn with_loops(self, position: PidConfig, speed: PidConfig) -> Result<Self, ConfigError> {
         let limit = self.torque_limit_nm;
         let loops = TorqueLoops::new(position, speed.with_output_limit(limit))?;
@@ -301,14 +301,14 @@ enum Before {
 
 impl TorqueLoops {
     /// # Errors
-    /// As [`Pid::new`] for a loop.
+    /// As [`Pid::new`] of a loop.
     pub(crate) fn new(position: PidConfig, speed: PidConfig) -> Result<Self, ConfigError> {
         let (position, speed) = (Pid::new(position)?, Pid::new(speed)?);
         Ok(Self { speed, position, before: Before::Rest })
     }
 
     /// # Errors
-    /// As [`Pid::new`] for a loop. Nothing is changed then.
+    /// As [`Pid::new`] of a loop. Nothing is changed then.
     pub(crate) fn set_config(
         &mut self,
         position: PidConfig,
