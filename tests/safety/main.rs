@@ -334,40 +334,51 @@ fn run<S: Subject<N>, const N: usize>(name: &str, clocks: u64, make: impl Fn(Set
     assert!(!has_rivals || seen.rivals > clocks / 2 && seen.alone > clocks / 40, "{name}");
 }
 
-fn every_device(clocks: u64) {
-    run("guard", clocks, Bare::<true>::new);
-    run("guard without feedback", clocks, Bare::<false>::new);
-    run("dji", clocks, Wheel::<false>::new);
-    run("dji that resumes", clocks, Wheel::<true>::new);
-    run("dji and own", clocks, Both::new);
-    run("snake", clocks, Snake::new);
-    run("damiao, MIT", clocks, Damiao::mit);
-    run("damiao, position", clocks, Damiao::position);
-    run("lk, torque", clocks, Lk::torque);
-    run("lk, velocity", clocks, Lk::velocity);
-    run("lk, position", clocks, Lk::position);
-    run("rmd, torque", clocks, Rmd::torque);
-    run("rmd, velocity", clocks, Rmd::velocity);
-    run("rmd, position", clocks, Rmd::position);
-    run("vesc", clocks, Vesc::new);
-    run("odrive, torque", clocks, Odrive::torque);
-    run("odrive, position", clocks, Odrive::position);
-    run("robstride, operation", clocks, RobStride::operation);
-    run("robstride, current", clocks, RobStride::current);
+/// A million updates of each device; another number of clocks by the environment.
+fn clocks() -> u64 {
+    let chosen = std::env::var("DRIVETRAIN_CLOCKS").ok();
+    chosen.map_or(1_000_000_u64.div_ceil(UPDATES), |clocks| clocks.parse().unwrap())
+}
+
+/// A test of each device, so that the cores share them.
+macro_rules! devices {
+    ($($(#[$hal:meta])? $test:ident: $name:literal, $make:expr;)*) => {
+        mod every_device_keeps_to_the_reference {
+            use super::*;
+
+            $(
+                $(#[$hal])?
+                #[test]
+                fn $test() {
+                    run($name, clocks(), $make);
+                }
+            )*
+        }
+    };
+}
+
+devices! {
+    guard: "guard", Bare::<true>::new;
+    guard_without_feedback: "guard without feedback", Bare::<false>::new;
+    dji: "dji", Wheel::<false>::new;
+    dji_that_resumes: "dji that resumes", Wheel::<true>::new;
+    dji_and_own: "dji and own", Both::new;
+    snake: "snake", Snake::new;
+    damiao_mit: "damiao, MIT", Damiao::mit;
+    damiao_position: "damiao, position", Damiao::position;
+    lk_torque: "lk, torque", Lk::torque;
+    lk_velocity: "lk, velocity", Lk::velocity;
+    lk_position: "lk, position", Lk::position;
+    rmd_torque: "rmd, torque", Rmd::torque;
+    rmd_velocity: "rmd, velocity", Rmd::velocity;
+    rmd_position: "rmd, position", Rmd::position;
+    vesc: "vesc", Vesc::new;
+    odrive_torque: "odrive, torque", Odrive::torque;
+    odrive_position: "odrive, position", Odrive::position;
+    robstride_operation: "robstride, operation", RobStride::operation;
+    robstride_current: "robstride, current", RobStride::current;
     #[cfg(feature = "hal")]
-    {
-        run("RC ESC", clocks, subjects::pins::esc);
-        run("brushed", clocks, subjects::pins::brushed);
-    }
-}
-
-#[test]
-fn every_device_keeps_to_the_reference() {
-    every_device(1_000);
-}
-
-#[test]
-#[ignore = "170 000 clocks of 60 updates: by .ci/long, one day in seven"]
-fn every_device_keeps_to_the_reference_under_ten_million_updates() {
-    every_device(170_000);
+    rc_esc: "RC ESC", subjects::pins::esc;
+    #[cfg(feature = "hal")]
+    brushed: "brushed", subjects::pins::brushed;
 }
