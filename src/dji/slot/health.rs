@@ -5,7 +5,7 @@ use crate::dji::codec::{FIRST_BELOW_ZERO, Range, celsius, to_raw};
 use crate::dji::{Facts, State};
 use crate::encoder::Homing;
 use crate::motor::{
-    Condition, Conditions, Health, HealthConfig, Link, Monitor, MotorName, Sample, Traffic, age,
+    Condition, Conditions, Health, HealthConfig, Link, Monitor, MotorName, Sample, Traffic,
     check_soft_limits, elapsed,
 };
 use crate::time::Duration;
@@ -180,7 +180,7 @@ fn run_checks(slot: &mut Slot, facts: &Facts, seen: &Surroundings) -> f32 {
     slot.saturated = slot.saturated.saturating_add(u16::from(at_limit));
     let sample = Sample {
         elapsed: seen.elapsed,
-        fresh: age(seen.now, slot.guard.heard()) <= u32::from(seen.elapsed) << 10,
+        fresh: slot.guard.was_heard_within(seen.now, u32::from(seen.elapsed) << 10),
         effort: f32::from(seen.word) / f32::from(slot.full_limit),
         speed: f32::from(feedback.rpm()) / f32::from(facts.rotor_no_load_rpm()),
         current: f32::from(feedback.current()) / f32::from(facts.current_raw),

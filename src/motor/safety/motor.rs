@@ -86,6 +86,11 @@ impl MotorGuard {
         self.heard
     }
 
+    /// Tells whether the last feedback is at most `micros` old.
+    pub(crate) const fn was_heard_within(&self, now: u32, micros: u32) -> bool {
+        age(now, self.heard) <= micros
+    }
+
     pub(crate) const fn is_armed(&self) -> bool {
         matches!(self.arming, Arming::Armed)
     }
@@ -175,8 +180,7 @@ impl MotorGuard {
         self.in_time = gap_us << COUNT_BITS | self.in_time & COUNT;
     }
 
-    /// Notes feedback of a motor that is online, if the previous feedback and the previous update are recent. Otherwise does nothing and
-    /// returns `false`.
+    /// Notes feedback of an online motor, if the previous feedback and update are recent; otherwise does nothing and returns `false`.
     #[inline]
     pub(in crate::motor) fn hear_soon(
         &mut self,
@@ -284,7 +288,6 @@ impl MotorGuard {
     }
 
     /// Tells whether a new target may be taken.
-    ///
     /// A value that is not finite cancels the previous target: an older value must not act in its place when the feedback returns.
     #[inline]
     pub(crate) fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
