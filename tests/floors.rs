@@ -2,6 +2,11 @@
 
 #![cfg(test)]
 
+#[path = "floors/rules.rs"]
+mod rules;
+#[path = "floors/taint.rs"]
+mod taint;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -445,157 +450,6 @@ fn the_pid_is_half_of_the_controllers_that_it_replaced() {
     assert!(lines > 300 && steps > 1, "{lines} lines, {steps} functions");
     hold("lines of the PID", lines, MOST_OF_THE_PID.0);
     hold("functions of the PID that step", steps, MOST_OF_THE_PID.1);
-}
-
-/// A family asks the safety core, and has no rule of its own about these: ages and their limits, the gesture, the order of refusals, time
-/// that did not move on.
-const RULES: [&str; 14] = [
-    "late_us",
-    "offline_us",
-    "command_us",
-    "measured_us",
-    "good_frames",
-    "is_near",
-    "Gesture",
-    "Condition::Late",
-    "ClockFault",
-    "ArmError::",
-    ".late()",
-    ".offline()",
-    ".command()",
-    ".measured()",
-];
-
-/// Durations that a family compares with a limit: of the frames of its drives, none of a link or a target. File, words, reason.
-const TIMES_OF_DRIVES: [(&str, &str, &str); 6] = [
-    ("pwm/rc.rs", "self . arming_time", "an ESC wants neutral for so long before it follows"),
-    ("snake/slot.rs", "KEEP_RELAXED", "a disable is sent again: a drive may have missed it"),
-    ("snake/slot/health.rs", "window", "a joint that does not move, as its configuration says"),
-    ("motor/actuator/power.rs", "SETTLING", "a drive may report its former state for so long"),
-    ("motor/actuator/power.rs", "pause", "a frame for the power of a drive is sent again"),
-    ("motor/actuator/update.rs", "INQUIRY", "the rate of questions for settings"),
-];
-
-fn own_rules(text: &str) -> Vec<String> {
-    let code = code(text).filter(|line| !line.trim_start().starts_with("//"));
-    let lines = (1..).zip(code).filter(|(_, line)| RULES.iter().any(|rule| line.contains(rule)));
-    lines.map(|(number, line)| format!("{number}: {line}")).collect()
-}
-
-/// Statements that compare a time since another with a limit, and those that count held updates.
-fn own_judgements(text: &str) -> Vec<String> {
-    let tokens = tokens(text);
-    let statements = tokens.split(|token| [";", "{", "}"].contains(&token.as_str()));
-    let judges = |statement: &&[String]| {
-        let is = |place: usize, word: &str| statement.get(place).is_some_and(|token| token == word);
-        let places = || 0..statement.len();
-        let has_since =
-            places().any(|place| is(place, ".") && is(place + 1, "since") && is(place + 2, "("));
-        // No arrow, and no bracket of a type.
-        let compares = places().any(|place| {
-            (is(place, "<") || is(place, ">"))
-                && !is(place.wrapping_sub(1), "-")
-                && !is(place.wrapping_sub(1), "=")
-                && !is(place + 1, ">")
-        });
-        let is_held =
-            |token: &String| token.split('_').any(|word| word == "held" || word == "hold");
-        let counts = places()
-            .any(|place| is(place, "saturating_add") || is(place, "+") && is(place + 1, "="));
-        has_since && compares || counts && statement.iter().any(is_held)
-    };
-    statements.filter(judges).map(|statement| statement.join(" ")).collect()
-}
-
-/// The files of the families, and of actuators: the path below `src`, and the text.
-fn files_of_families() -> impl Iterator<Item = (String, String)> {
-    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let folders = FAMILIES.into_iter().chain(["pwm", "motor/actuator"]);
-    let files = folders.flat_map(move |folder| {
-        let files = rust_files(&src.join(folder)).into_iter();
-        let src = src.clone();
-        files.map(move |file| (file.strip_prefix(&src).unwrap().display().to_string(), file))
-    });
-    let files = files.filter(|(name, _)| !name.contains("/tests"));
-    files.map(|(name, file)| (name, fs::read_to_string(file).unwrap()))
-}
-
-#[test]
-fn no_family_has_a_safety_rule_of_its_own() {
-    for (file, text) in files_of_families() {
-        let found = own_rules(&text);
-        assert!(found.is_empty(), "{file}: {found:?}");
-    }
-    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let core = rust_files(&src.join("motor/safety"));
-    let of_core = core.iter().map(|file| own_rules(&fs::read_to_string(file).unwrap()).len());
-    assert!(of_core.sum::<usize>() > 10, "the rules are somewhere");
-}
-
-#[test]
-fn no_family_compares_an_age_with_a_limit_or_counts_held_updates() {
-    let mut used = BTreeSet::new();
-    for (file, text) in files_of_families() {
-        for statement in own_judgements(&text) {
-            let of_drive =
-                |(name, words, _): &(&str, &str, &str)| *name == file && statement.contains(words);
-            let place = TIMES_OF_DRIVES.iter().position(of_drive);
-            assert!(place.is_some(), "{file} judges by itself: {statement}");
-            used.extend(place);
-        }
-        // An update without a step is judged by the one rule about it.
-        let asks = ["Repeat", ".guard.hold("].iter().any(|rule| text.contains(rule));
-        assert!(asks || !text.contains("is_hold()"), "{file} has its own rule for a held update");
-    }
-    assert_eq!(used.len(), TIMES_OF_DRIVES.len(), "an exception without its line");
-}
-
-/// The order of the reasons has one home: nothing but it makes a refusal.
-#[test]
-fn a_request_to_arm_is_refused_in_one_file() {
-    let homes: Vec<String> = sources()
-        .into_iter()
-        .filter(|(module, path, _)| module != "sim" && !path.iter().any(|part| part == "tests"))
-        .filter(|(_, _, text)| makes_refusal(&tokens(text)))
-        .map(|(_, path, _)| path.display().to_string())
-        .collect();
-    assert!(homes.iter().all(|home| home.ends_with("motor/arming.rs")), "{homes:?}");
-    assert_eq!(homes.len(), 1);
-}
-
-fn makes_refusal(tokens: &[String]) -> bool {
-    tokens.windows(3).any(|path| {
-        path[0] == "ArmError" && path[1] == "::" && path[2].starts_with(char::is_uppercase)
-    })
-}
-
-#[test]
-fn a_rule_in_a_family_is_found() {
-    assert!(makes_refusal(&tokens("return Err(ArmError::NotReleased);")));
-    assert!(!makes_refusal(&tokens("// ArmError::Stopped\nArmError::around(stopped, down)")));
-
-    for rule in [
-        "if stopped { return Err(ArmError::Stopped); }",
-        "if self.guard.conditions().contains(Condition::ClockFault) {}",
-        "let is_old = age > timeouts.late();",
-    ] {
-        assert_eq!(own_rules(rule).len(), 1, "{rule}");
-    }
-    for rule in [
-        "if now.since(self.heard) > LIMIT { self.rest(); }",
-        "let is_fresh = now.since(self.commanded)\n    <= self.limit;",
-        "self.held_steps = self.held_steps.saturating_add(1);",
-        "hold_count += 1;",
-    ] {
-        assert_eq!(own_judgements(rule).len(), 1, "{rule}");
-    }
-    for other in [
-        "/// ArmError::Stopped\nfn arm(&mut self) -> Result<(), ArmError> {}",
-        "let dt: Option<f32> = Some(now.since(then).as_secs_f32());\nlet x = a > b;",
-    ] {
-        assert!(own_rules(other).is_empty(), "{other}");
-    }
-    assert_eq!(own_judgements("let dt = now.since(then); let is_more = threshold > 1;").len(), 0);
 }
 
 /// The types whose inherent methods stand in at most this many files.
