@@ -415,6 +415,15 @@ mod tests {
     use super::*;
 
     #[test]
+    fn feedback_counts_as_heard_for_as_long_as_is_asked() {
+        let heard = u32::MAX - 5_000; // before the wrap
+        let motor = MotorGuard { heard, ..MotorGuard::NEW };
+        let ages = [0, 12_288, 12_289].map(|age| heard.wrapping_add(age));
+        assert_eq!(ages.map(|now| motor.was_heard_within(now, 12_288)), [true, true, false]);
+        assert!(motor.was_heard_within(heard.wrapping_sub(1), 0), "stamped ahead");
+    }
+
+    #[test]
     fn the_range_opens_in_proportion_to_time_and_stays_open() {
         let at_ms = |ms: u32| (1_000 * ms).wrapping_sub(1_100_000); // over the wrap
         let mut motor = MotorGuard::NEW.with(OPENING, false);
