@@ -57,7 +57,7 @@ impl Guard {
     #[must_use]
     pub const fn with_timeouts(mut self, timeouts: Timeouts) -> Self {
         self.device.set_timeouts(timeouts);
-        self.motor.distrust();
+        self.motor.trust(0);
         self
     }
 
@@ -76,29 +76,6 @@ impl Guard {
         if !is_usual {
             self.hear_anytime(now);
         }
-    }
-
-    /// Notes feedback within the [trusted](Self::trust) gap; otherwise returns `false`, and notes nothing.
-    #[inline]
-    pub(super) fn hear_in_time(&mut self, now: Instant) -> bool {
-        let now = now.stamp();
-        let is_in_time =
-            self.motor.is_in_time(now) && self.motor.trusts(now.wrapping_sub(self.device.now()));
-        if is_in_time {
-            self.motor.hear_in_time(now);
-        }
-        is_in_time
-    }
-
-    /// Trusts feedback after a shorter gap than this, once the motor was updated.
-    pub(super) fn trust(&mut self, gap_us: u32) {
-        let gap_us = gap_us.min(self.device.timeouts().late_us());
-        self.motor.trust(if self.device.is_running() { gap_us } else { 0 });
-    }
-
-    /// Returns the number of frames [in time](Self::hear_in_time) since the last call.
-    pub(super) const fn take_in_time(&mut self) -> u16 {
-        self.motor.take_in_time()
     }
 
     /// Notes feedback after a gap of any length.
@@ -166,29 +143,10 @@ impl Guard {
         (self.device.is_quiet(before) || self.compare_ages(before, now)) && self.motor.drives()
     }
 
-    /// Moves the time on to a tick in which no rule has to be applied and the motor may be driven; otherwise returns `false`, and moves
-    /// nothing.
-    #[inline]
-    pub(super) fn goes_on(&mut self, now: Instant) -> bool {
-        let goes_on = self.device.is_quiet_at(now) && self.motor.drives();
-        if goes_on {
-            self.device.begin(now);
-        }
-        goes_on
-    }
-
-    /// Has the rules applied at this time, if not before.
-    pub(super) fn wake_at(&mut self, time: Instant) {
-        self.device.wake_at(time);
-    }
-
     /// Applies all due time-outs, and computes the time of the next. Returns `false` if time did not move on.
     #[cold]
     #[inline(never)]
     fn compare_ages(&mut self, before: Instant, now: Instant) -> bool {
-        if self.device.prolong(before, &self.motor) {
-            return true;
-        }
         if !self.device.moves_on(before) {
             self.end_without_time(before, now);
             return false;

@@ -253,3 +253,45 @@ impl Vitals {
         Self { has_fault, has_warning, error_code: fault.unwrap_or(warning), ..Self::default() }
     }
 }
+
+/// Feedback and updates for which no rule is due.
+impl Guard {
+    /// Notes feedback within the [trusted](Self::trust) gap; otherwise returns `false`, and notes nothing.
+    #[inline]
+    pub(super) fn hear_in_time(&mut self, now: Instant) -> bool {
+        let now = now.stamp();
+        let since_update = now.wrapping_sub(self.device.now());
+        let is_in_time = self.motor.is_in_time(now) && self.motor.trusts(since_update);
+        if is_in_time {
+            self.motor.hear_in_time(now);
+        }
+        is_in_time
+    }
+
+    /// Trusts feedback after a shorter gap than this, once the motor was updated.
+    pub(super) fn trust(&mut self, gap_us: u32) {
+        let gap_us = gap_us.min(self.device.timeouts().late_us());
+        self.motor.trust(if self.device.is_running() { gap_us } else { 0 });
+    }
+
+    /// Returns the number of frames [in time](Self::hear_in_time) since the last call.
+    pub(super) const fn take_in_time(&mut self) -> u16 {
+        self.motor.take_in_time()
+    }
+
+    /// Moves the time on to a tick in which no rule has to be applied and the motor may be driven; otherwise returns `false`, and moves
+    /// nothing.
+    #[inline]
+    pub(super) fn goes_on(&mut self, now: Instant) -> bool {
+        let goes_on = self.device.is_quiet_at(now) && self.motor.drives();
+        if goes_on {
+            self.device.begin(now);
+        }
+        goes_on
+    }
+
+    /// Has the rules applied at this time, if not before.
+    pub(super) fn wake_at(&mut self, time: Instant) {
+        self.device.wake_at(time);
+    }
+}

@@ -163,27 +163,6 @@ impl<const N: usize> DeviceGuard<N> {
         self.quiet_until = self.updated + Duration::from_micros(micros.into());
     }
 
-    /// Sets for how long no age exceeds its limit, with a usual motor as the only one: online, without a condition, and with the whole range
-    /// open. Returns `false`, without a change, if a rule may have to be applied.
-    pub(in crate::motor) fn prolong(&mut self, before: Instant, motor: &MotorGuard) -> bool {
-        let is_usual = self.is_running
-            && !self.is_disturbed
-            && !self.gesture.is_tripped()
-            && before < self.updated
-            && self.armed_at <= self.updated
-            && !self.is_pause(before);
-        if !is_usual || motor.is_opening() || !motor.latch().active().is_empty() {
-            return false;
-        }
-        let mut ages = Ages::none(self.now, &self.timeouts);
-        ages.add(motor);
-        let quiet = ages.within_limits_us().filter(|_| motor.link == Link::Online);
-        if let Some(micros) = quiet {
-            self.rest_for(micros);
-        }
-        quiet.is_some()
-    }
-
     /// Counts as quiet until this time at most.
     pub(in crate::motor) fn wake_at(&mut self, time: Instant) {
         self.quiet_until = self.quiet_until.min(time);

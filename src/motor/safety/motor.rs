@@ -155,11 +155,6 @@ impl MotorGuard {
         micros < self.in_time >> COUNT_BITS
     }
 
-    /// Trusts no gap.
-    pub(in crate::motor) const fn distrust(&mut self) {
-        self.in_time &= COUNT;
-    }
-
     /// Notes feedback that is [in time](Self::is_in_time).
     #[inline(always)]
     pub(crate) const fn hear_in_time(&mut self, now: u32) {
@@ -175,19 +170,15 @@ impl MotorGuard {
     }
 
     /// Sets the trusted gap; 0 unless the motor is online.
-    pub(crate) fn trust(&mut self, gap_us: u32) {
-        let gap_us = if self.link == Link::Online { gap_us.min(u32::MAX >> COUNT_BITS) } else { 0 };
+    pub(crate) const fn trust(&mut self, gap_us: u32) {
+        let most = if matches!(self.link, Link::Online) { u32::MAX >> COUNT_BITS } else { 0 };
+        let gap_us = if gap_us < most { gap_us } else { most };
         self.in_time = gap_us << COUNT_BITS | self.in_time & COUNT;
     }
 
     /// Notes feedback of an online motor, if the previous feedback and update are recent; otherwise does nothing and returns `false`.
     #[inline]
-    pub(in crate::motor) fn hear_soon(
-        &mut self,
-        now: u32,
-        updated: u32,
-        timeouts: &Timeouts,
-    ) -> bool {
+    pub(crate) fn hear_soon(&mut self, now: u32, updated: u32, timeouts: &Timeouts) -> bool {
         let is_soon = |before| now.wrapping_sub(before) <= timeouts.late_us();
         let is_usual = self.link == Link::Online && is_soon(self.heard) && is_soon(updated);
         if is_usual {
@@ -242,7 +233,7 @@ impl MotorGuard {
 
     fn set_late(&mut self) {
         self.link = Link::Late;
-        self.distrust();
+        self.in_time &= COUNT;
         self.latch.set(Condition::Late, true);
         self.interrupt();
     }
@@ -250,7 +241,7 @@ impl MotorGuard {
     /// Handles a lost motor: relaxes, and refuses targets until armed again or, if configured, until recovered.
     fn lose(&mut self) {
         self.link = Link::Offline;
-        self.distrust();
+        self.in_time &= COUNT;
         self.latch.set(Condition::Late, true);
         self.latch.set(Condition::Offline, true);
         if self.is_armed() {
@@ -334,17 +325,13 @@ impl MotorGuard {
 
     /// Returns the stamp of a target that belongs to a measurement of another sensor, taken at `at`: the target expires with the
     /// measurement. Returns `None` if the measurement is too old already.
-    pub(crate) const fn stamp_of_measurement(
-        at: u32,
-        now: u32,
-        timeouts: &Timeouts,
-    ) -> Option<u32> {
-        if !is_near(now, at, timeouts.measured_us()) {
+    pub(crate) const fn stamp_of_measurement(at: u32, now: u32, limits: &Timeouts) -> Option<u32> {
+        if !is_near(now, at, limits.measured_us()) {
             return None;
         }
-        let stamp = at.wrapping_add(timeouts.measured_us()).wrapping_sub(timeouts.command_us());
-        let is_ahead = age(now, stamp) == 0;
-        Some(if is_ahead { now } else { stamp })
+        let stamp = at.wrapping_add(limits.measured_us()).wrapping_sub(limits.command_us());
+        // A stamp ahead has no age.
+        Some(if age(now, stamp) == 0 { now } else { stamp })
     }
 
     /// Discards the target.
