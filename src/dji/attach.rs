@@ -161,7 +161,15 @@ pub(super) fn is_armed(slots: &[Slot]) -> bool {
 /// Returns a command of one of these motors that another node has sent.
 pub(super) fn rival_among<'a>(mut slots: impl Iterator<Item = &'a Slot>) -> Option<Claim> {
     let slot = slots.find(|slot| slot.guard.latch().has(Condition::SecondMaster))?;
-    Some(Claim::command(StandardId::new(slot.place.frame().id())?, slot.name()?))
+    claim(slot.place.frame().id(), Claim::command, slot.name()?)
+}
+
+pub(super) fn claim(
+    id: u16,
+    direction: fn(StandardId, MotorName) -> Claim,
+    motor: MotorName,
+) -> Option<Claim> {
+    Some(direction(StandardId::new(id)?, motor))
 }
 
 /// Rates for the computation of the load.

@@ -1,6 +1,6 @@
 //! The bus as a device of the runner, and as an owner of motors for a chassis.
 
-use super::attach;
+use super::attach::{self, claim};
 use super::slot::{Slot, health};
 use super::{AnyHandle, Bus, Handle, Model};
 use crate::frame::CanFrame;
@@ -10,7 +10,6 @@ use crate::motor::{
 };
 use crate::time::{Edge, Instant, Tick};
 use crate::units::{Angle, AngularVelocity};
-use embedded_can::StandardId;
 
 impl<B, const N: usize> CanDevice for Bus<B, N> {
     fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
@@ -42,11 +41,10 @@ impl<B, const N: usize> CanDevice for Bus<B, N> {
             let motors = self.motors.by_id();
             motors.filter_map(|(id, _, slot)| Some((slot.name()?, slot, id)))
         };
-        let feedback = attached()
-            .filter_map(|(motor, _, id)| Some(Claim::feedback(StandardId::new(id)?, motor)));
+        let feedback = attached().filter_map(|(motor, _, id)| claim(id, Claim::feedback, motor));
         let commands = super::CommandFrame::ALL.into_iter().filter_map(move |frame| {
             let (motor, ..) = attached().find(|(_, slot, _)| slot.place.frame() == frame)?;
-            Some(Claim::command(StandardId::new(frame.id())?, motor))
+            claim(frame.id(), Claim::command, motor)
         });
         feedback.chain(commands)
     }
