@@ -61,8 +61,7 @@ impl Guard {
         self
     }
 
-    /// Sets the time in which the output range opens after arming, from zero to the whole: 0.2 s by default, in whole milliseconds up to 65
-    /// s.
+    /// Sets the time in which the output range opens after arming, from zero to the whole: 0.2 s by default, in whole ms up to 65 s.
     #[must_use]
     pub const fn with_opening(self, time: Duration) -> Self {
         Self { motor: self.motor.with(time, false), ..self }

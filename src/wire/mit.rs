@@ -24,13 +24,12 @@
 //! # Ok::<(), drivetrain::error::ConfigError>(())
 //! ```
 //!
-//! **A drive continues with its last command** when no other comes: after a cut of the cable or a stop of the program, the drive
-//! keeps driving. Only a time-out of its own ends this, and has to be set in the drive. For Damiao the time-out is the register
-//! `TIMEOUT` (9), in units of 50 µs, 0 for none: 2000 is 100 ms. The drive then disables itself and reports error 13. Other makes
-//! have a setting of their own. Pull the cable with lifted wheels to test the setting.
+//! **A drive continues with its last command** when no other comes: after a cut of the cable or a stop of the program, the drive keeps driving.
+//! Only a time-out of its own ends this, and has to be set in the drive. For Damiao the time-out is the register `TIMEOUT` (9), in units of 50 µs,
+//! 0 for none: 2000 is 100 ms. The drive then disables itself and reports error 13. Other makes have a setting of their own. Pull the cable with
+//! lifted wheels to test the setting.
 //!
-//! A position saturates at the range of the field, so [`Feedback::position_rad`] at either end of the range is no position:
-//! the shaft is there or beyond.
+//! A position saturates at the range of the field, so [`Feedback::position_rad`] at either end of the range is no position: the shaft is there or beyond.
 //!
 //! Sources: Damiao's protocol and registers as python-damiao-driver documents them; frames of public tests, see `tests/data/wire`.
 
@@ -40,10 +39,8 @@ use impedance::Impedance;
 
 /// The data to enable a drive.
 pub const ENABLE: [u8; 8] = special(0xFC);
-
 /// The data to disable a drive.
 pub const DISABLE: [u8; 8] = special(0xFD);
-
 /// The data to make the present position zero.
 pub const SET_ZERO: [u8; 8] = special(0xFE);
 
@@ -192,24 +189,14 @@ impl Ranges {
     /// Writes a torque in Nm alone, as [`encode`](Self::encode).
     #[inline]
     pub(crate) const fn encode_torque(&self, torque_nm: f32) -> [u8; 8] {
-        let [position, velocity, _, _, rest] = Self::rest(TOP_12);
-        let torque = match self.torque.counts(torque_nm, TOP_12) {
-            Some(torque) => torque,
-            None => rest,
-        };
-        let first = position << 16 | velocity << 4;
-        ((first as u64) << 32 | torque as u64).to_be_bytes()
-    }
-
-    /// Returns the counts of rest.
-    const fn rest(top: u16) -> [u32; 5] {
-        [TOP_16 as u32 / 2, top as u32 / 2, 0, 0, top as u32 / 2]
+        let torque = self.torque.counts_or_zero(torque_nm, TOP_12);
+        (0x7FFF_7FF0_0000_0000 | torque as u64).to_be_bytes()
     }
 
     /// Returns the counts of all fields, those of a position of 16 bits.
     #[inline]
     const fn counts(&self, command: &Impedance, top: u16) -> [u32; 5] {
-        let rest = Self::rest(top);
+        let rest = [TOP_16 as u32 / 2, top as u32 / 2, 0, 0, top as u32 / 2];
         let Some(torque) = self.torque.counts(command.torque_nm, top) else { return rest };
         if command.is_torque() {
             let [position, velocity, kp, kd, _] = rest;
@@ -332,11 +319,10 @@ impl Range {
         }
     }
 
+    /// Truncates; NaN is zero, in the middle of the range.
+    #[inline]
     const fn counts_or_zero(self, value: f32, top: u16) -> u32 {
-        match (self.counts(value, top), self.counts(0.0, top)) {
-            (Some(counts), _) | (None, Some(counts)) => counts,
-            (None, None) => 0,
-        }
+        if let Some(counts) = self.counts(value, top) { counts } else { top as u32 / 2 }
     }
 
     const fn value(self, counts: u16, top: u16) -> f32 {
