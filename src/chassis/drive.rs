@@ -121,7 +121,7 @@ impl<const N: usize> Chassis<Swerve<N>> {
     /// Reads the motors of all modules, sets their targets, and returns the targets: as for plain wheels, with an `owner` of both
     /// motors of each module.
     ///
-    /// If a steering motor refuses its target, the target of its drive motor is zero.
+    /// If a steering motor refuses its target, the target of its drive motor is zero at once, without the limit of the acceleration.
     pub fn drive<D: Copy, S: Copy, O: VelocityDrive<D> + AngleDrive<S> + ?Sized>(
         &mut self,
         owner: &mut O,

@@ -240,7 +240,7 @@ impl<H: Copy, D: AngleDrive<H>, const N: usize> AngleDrive<(usize, H)> for [D; N
 pub enum TargetError {
     /// The owner has no motor with this handle, for example after a detach.
     Detached,
-    /// The target is NaN or infinite. The motor goes to its safe output at once.
+    /// The target is NaN or infinite. The motor goes to its safe output in the next update, unless a good target comes before.
     NotFinite,
     /// The device is not armed.
     Disarmed,

@@ -200,7 +200,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
 
     /// Reads the clock and returns the step that is due, if any.
     ///
-    /// If the clock stands or goes back, a step with a `dt_s` of 0 is due: its update sends zeros and relaxes every motor
+    /// If the clock stands, or goes back behind the last tick, a step with a `dt_s` of 0 is due: its update sends zeros and relaxes every motor
     /// until armed again.
     ///
     /// A clock stands when too many readings in a row, by this method and by [`poll`](Self::poll), show no later time. The limit

@@ -7,7 +7,8 @@ use heapless::spsc;
 /// A queue of received frames with the time of their arrival, from a CAN interrupt to the control task.
 ///
 /// The queue holds `N - 1` frames. If the queue is full, a new frame is dropped and counted: the newest feedback is
-/// lost, and the age of the motor's feedback handles the rest.
+/// lost, and the age of the motor's feedback handles the rest. On a core without compare-and-swap, such as RISC-V IMC, the program provides a
+/// `critical-section`, or does not link.
 ///
 /// # Examples
 /// ```

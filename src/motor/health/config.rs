@@ -123,15 +123,18 @@ impl HealthConfig {
     /// Outside, the motor is driven inward only, also if the shaft starts there; at speed, already a little before. No effect while the
     /// absolute position is unknown: for a geared motor, until the position is set. A motor without CAN refuses soft limits.
     ///
-    /// An [`Actuator`](crate::motor::Actuator) keeps each kind of target inside, and has the edge from 0.02 rad before a limit:
+    /// An [`Actuator`](crate::motor::Actuator) changes each kind of target, and has the edge from 0.02 rad before a limit. An angle, or loops of this
+    /// crate, hold a loaded joint at its limit; a damper and a torque do not:
     ///
     /// * An angle is reached by the shortest way that stays inside; an angle outside is the limit next to it.
     /// * An outward velocity is at most the distance to the limit divided by 0.1 s. Beyond the limit it leads back in the same way, no faster
-    ///   than 0.5 rad/s and than the target. A velocity of zero stays zero: a load, or a drive whose command has no exact zero, moves the
-    ///   joint on, a J4310 by 0.01 rad/s. An angle as the target holds the joint.
+    ///   than 0.5 rad/s and than the target: a damper, of gains or of an impedance, holds a load of up to its damping times this velocity, and a
+    ///   larger load pulls the joint on. A velocity of zero stays zero: any load, or a drive whose command has no exact zero, moves the joint on, a
+    ///   J4310 by 0.01 rad/s.
+    /// * The angle of an impedance is limited, and its velocity and torque as above.
     /// * An outward torque falls to zero over the last 0.02 rad, and from half of that velocity on; at a higher velocity it brakes, with at most
-    ///   as much torque as the target has. So a small target stops a fast joint late, and a torque of zero never does.
-    /// * Where the drive has no angle, beyond the range of its feedback, the motor rests.
+    ///   as much torque as the target has. So a small target stops a fast joint late, and a torque of zero never does; neither holds a load.
+    /// * Where the drive has no angle, beyond the range of its feedback, the motor rests, armed and without an edge.
     ///
     /// The limits count from the zero of the joint: [given](crate::motor::Actuator::with_zero) or
     /// [set](crate::motor::Actuator::set_present_angle), otherwise that of a drive with

@@ -32,7 +32,7 @@ const TMAX: usize = 6;
 ///
 /// [`Simulation::advance_drives`](crate::sim::Simulation::advance_drives) puts the drive on a bus. Enabling, errors, the four control
 /// modes, registers and the time-out are as in the manual. A frame to the id of another control mode is discarded without an answer. The
-/// shaft is an inertia with viscous friction.
+/// shaft is an inertia with viscous friction; the drive's loop of the velocity is proportional alone, and gives way to a load.
 ///
 /// # Examples
 /// ```
