@@ -129,6 +129,24 @@ fn heat_takes_output_away_and_then_all_of_it() {
 }
 
 #[test]
+fn heat_is_looked_at_after_the_clock_went_back_too() {
+    let mut bench = Bench::new(&USUAL);
+    for _ in 0..5_000 {
+        assert!(bench.step([30, 0, 0, 0]));
+    }
+    assert_eq!(bench.own.health().feedback_hz, 1_000);
+    bench.ms -= 4_000;
+    for _ in 0..1_200 {
+        assert!(!bench.step([30, 0, 0, 0]), "tripped");
+    }
+    assert_eq!(bench.own.health().feedback_hz, 1_000);
+    bench.own.arm(bench.now()).unwrap();
+    assert!(bench.step([30, 0, 0, 0]));
+    bench.wait(100);
+    assert!(!bench.step([100, 0, 0, 0]));
+}
+
+#[test]
 fn a_fault_relaxes_until_it_is_gone_and_armed_and_a_warning_does_not() {
     let mut bench = Bench::new(&USUAL);
     assert!(bench.step([30, 3, 0, 0]) && bench.step([30, 0, 0, 0]));

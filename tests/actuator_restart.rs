@@ -155,6 +155,29 @@ fn an_angle_within_a_turn_is_no_restart_at_its_ends() {
 }
 
 #[test]
+fn a_zero_given_to_a_driven_joint_is_placed() {
+    let mut bench = Bench::new(true, 0.5);
+    for ms in 3..300 {
+        bench.hear(ms, 0.5, 0.0);
+        bench.0.set_angle((), Angle::ZERO).unwrap();
+        assert!(bench.update(ms, 0.001).is_some());
+    }
+    bench.0 = bench.0.with_zero(Angle::from_radians(0.2)).unwrap();
+    bench.hear(300, 0.5, 0.0);
+    assert!(bench.update(300, 0.001).is_some());
+    assert_near(bench.angle(), 0.3);
+    // The drive has an angle with a later frame only.
+    bench.0 = bench.0.with_zero(Angle::from_radians(0.1)).unwrap();
+    for (ms, angle, expected) in
+        [(301, f32::NAN, None), (302, f32::NAN, None), (303, 0.5, Some(0.4))]
+    {
+        bench.hear(ms, angle, 0.0);
+        assert!(bench.update(ms, 0.001).is_some());
+        assert_eq!(bench.angle().map(|angle| (angle * 1e3).round() / 1e3), expected);
+    }
+}
+
+#[test]
 fn a_healthy_joint_keeps_its_zero() {
     // From rest to rest within a gap that is almost a loss.
     let mut bench = Bench::new(false, 0.0);

@@ -110,6 +110,10 @@ impl Watch {
         vitals: impl Fn() -> Vitals,
         now: Instant,
     ) -> f32 {
+        if now < self.checked {
+            // The clock went back.
+            (self.checked, self.next) = (now, now + PERIOD);
+        }
         let Vitals { has_fault, has_warning, error_code, .. } = vitals();
         let is_well = !(has_fault || has_warning)
             && error_code == self.error_code

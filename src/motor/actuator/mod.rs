@@ -181,6 +181,7 @@ impl<M: DriveProtocol> Actuator<M> {
             return Err(ConfigError::Unsupported("zero"));
         }
         self.joint.zero = Zero::Given(angle);
+        self.is_steady = false;
         Ok(self)
     }
 

@@ -125,6 +125,7 @@ impl<M: DriveProtocol> Actuator<M> {
     #[inline(never)]
     pub(super) fn decide(&mut self, step: TimeStep, now: Instant) -> bool {
         self.is_steady = false;
+        self.place_zero();
         let left = self.check(now);
         let drives = self.guard.drives(now);
         if drives && !step.is_hold() && self.was_online && self.has_nothing_due() {
@@ -179,7 +180,7 @@ impl<M: DriveProtocol> Actuator<M> {
         }
         self.share = left;
         let is_well = self.watch.is_well() && self.guard.conditions().is_empty();
-        self.is_steady = is_well && self.has_nothing_due();
+        self.is_steady = is_well && self.has_nothing_due() && !self.joint.awaits_zero();
         self.guard.wake_at(self.watch.next());
     }
 
@@ -211,7 +212,6 @@ impl<M: DriveProtocol> Actuator<M> {
         if was_online && !self.was_online {
             self.motor.forget_settings();
         }
-        self.place_zero();
         let is_idle = !self.power.is_on() && !self.has_posted && self.offered.is_rest;
         let is_due = now < self.inquired || now.since(self.inquired) >= INQUIRY;
         if !is_idle || !is_due || self.motor.is_enabled() == Some(true) {
@@ -319,7 +319,6 @@ impl<M: DriveProtocol> Actuator<M> {
     /// Notes whether the shaft is at a soft limit.
     #[inline(never)]
     fn check_limits(&mut self, now: Instant) {
-        self.place_zero();
         let ((angle, _), inside) = self.shaft();
         let is_lost = angle.is_none() && self.joint.has_limits();
         if is_lost {

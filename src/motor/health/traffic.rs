@@ -36,6 +36,10 @@ impl Traffic {
 
     /// Ends a window that began at `from`, at a rate that the application chose, if the window is over at `now`.
     pub(crate) fn end_window(&mut self, from: &mut Instant, now: Instant) -> bool {
+        if now < *from {
+            // The clock went back, and the length of the window is not known.
+            (*from, self.frames) = (now, 0);
+        }
         let window = now.since(*from);
         let is_over = window >= Self::WINDOW;
         if is_over {
