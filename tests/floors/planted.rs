@@ -15,7 +15,7 @@ fn found_with(file: &str, lines: &str) -> Vec<String> {
 }
 
 /// File, and a rule.
-const RULES: [(&str, &str); 34] = [
+const RULES: [(&str, &str); 39] = [
     // Ages of two statements, under other names, in a field, of a function, as an argument.
     (
         "damiao/bus.rs",
@@ -92,7 +92,25 @@ const RULES: [(&str, &str); 34] = [
         "snake/slot.rs",
         "impl Slot { fn f(&mut self) { *self = Self { missed: self.missed + 1, ..*self }; } }",
     ),
+    // By an equation, a quotient, a register of bits.
+    (
+        "damiao/bus.rs",
+        "fn f(now: Instant, then: Instant) -> bool { now.since(then).as_micros() / 30_000 != 0 }",
+    ),
+    (
+        "dji/slot/target.rs",
+        "fn f(now: u32, then: u32) -> bool { now.wrapping_sub(then).min(30_000) == 30_000 }",
+    ),
+    (
+        "damiao/bus.rs",
+        "impl Motor { fn f(&mut self) -> bool { self.history <<= 1; self.history == 0 } }",
+    ),
     // A ramp, with and without its name.
+    (
+        "snake/slot.rs",
+        "impl Slot { fn f(&mut self) -> f32 { self.part = (self.part * 1.05).min(1.0); self.part } }",
+    ),
+    ("damiao/bus.rs", "impl Motor { fn f(&mut self) { self.part *= 1.05; } }"),
     (
         "damiao/bus.rs",
         "impl Motor { fn f(&mut self) -> f32 { self.part = (self.part + 0.01).min(1.0); self.part } }",

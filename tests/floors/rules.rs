@@ -59,7 +59,7 @@ const AGES: Seeds<'static> = Seeds {
 };
 
 /// Ages that a family compares with a limit: of the frames of its drives, none of a link or a target. File, words, reason.
-const TIMES_OF_DRIVES: [(&str, &str, &str); 22] = [
+const TIMES_OF_DRIVES: [(&str, &str, &str); 24] = [
     ("dji/outbox.rs", "self . keep_alive_us", "zero frames are sent again"),
     (
         "dji/slot/gap.rs",
@@ -78,6 +78,16 @@ const TIMES_OF_DRIVES: [(&str, &str, &str); 22] = [
         "snake/bus.rs",
         "held > self . reply_timeout",
         "the same, and a held update counts a millisecond",
+    ),
+    (
+        "snake/schedule.rs",
+        "asked",
+        "a reply answers the register that was asked, kept beside a time",
+    ),
+    (
+        "snake/schedule.rs",
+        "held_steps ( ) = = 0",
+        "in an update without a step, no time for a reply passes",
     ),
     ("snake/schedule.rs", "passed > timeout", "a reply that does not come is not waited for"),
     ("snake/slot.rs", "KEEP_RELAXED", "a disable is sent again: a drive may have missed it"),
@@ -101,7 +111,16 @@ const TIMES_OF_DRIVES: [(&str, &str, &str); 22] = [
 ];
 
 /// Fields that count, by folder: what they count.
-const COUNTS: [(&str, &str, &[&str]); 20] = [
+const COUNTS: [(&str, &str, &[&str]); 25] = [
+    ("dji", "no count: gains of a configuration, a current in its unit", &["current", "kd", "ki"]),
+    ("lk", "no count: a current in its unit", &["current"]),
+    ("snake", "no count: a bit for each joint", &["reads", "returned", "stops", "writes"]),
+    ("vesc", "no count: fields of a frame", &["inputs"]),
+    (
+        "motor/actuator",
+        "no count: a target in the direction of the drive",
+        &["torque_nm", "velocity"],
+    ),
     ("damiao", "frames for the power of a drive, whose ids take turns", &["specials"]),
     (
         "dji",

@@ -254,6 +254,8 @@ impl Text {
         match sign {
             "<" => before != "<" && after != "<" && !self.opens_types(place),
             ">" => !["-", "=", ">"].contains(&before) && after != ">" && !self.closes_types(place),
+            "=" => after == "=" && !["<", ">", "=", "!"].contains(&before),
+            "!" => after == "=",
             _ => false,
         }
     }
@@ -789,14 +791,16 @@ impl<'a> Taint<'a> {
 
 /// Both sides of the assignment whose sign is at a place.
 fn assignment(text: &Text, place: usize) -> Option<((usize, usize), (usize, usize))> {
+    let before = text.before(place);
+    let is_shift = ["<", ">"].contains(&before) && text.before(place - 1) == before;
     let is_sign = text.at(place) == "="
-        && !["=", "<", ">", "!"].contains(&text.before(place))
+        && (is_shift || !["=", "<", ">", "!"].contains(&before))
         && !["=", ">"].contains(&text.at(place + 1));
     if !is_sign {
         return None;
     }
-    let is_compound = ["+", "-", "*", "/", "|", "&", "%", "^"].contains(&text.before(place));
-    let end = if is_compound { place - 1 } else { place };
+    let is_compound = is_shift || ["+", "-", "*", "/", "|", "&", "%", "^"].contains(&before);
+    let end = place - usize::from(is_compound) - usize::from(is_shift);
     let mut from = end;
     while let Some(before) = from.checked_sub(1) {
         match text.at(before) {
@@ -811,7 +815,7 @@ fn assignment(text: &Text, place: usize) -> Option<((usize, usize), (usize, usiz
     Some(((from, end), (if is_compound { from } else { place + 1 }, right)))
 }
 
-/// The fields that count: by a sum or a difference with themselves.
+/// The fields that count: by a sum, a difference, a product, a quotient or a shift of themselves.
 pub(crate) fn counting_in(tokens: &[String]) -> BTreeSet<String> {
     let text = Text::of(tokens.to_vec());
     let mut found = BTreeSet::new();
@@ -820,7 +824,9 @@ pub(crate) fn counting_in(tokens: &[String]) -> BTreeSet<String> {
             let is_sum = |at: usize| {
                 let follows = [")", "]"].contains(&text.before(at))
                     || text.before(at).starts_with(|c: char| c.is_alphanumeric() || c == '_');
-                let sign = ["+", "-"].contains(&text.at(at)) && at > from && follows;
+                let is_shift = ["<", ">"].contains(&text.at(at)) && text.at(at + 1) == text.at(at);
+                let is_sign = is_shift || ["+", "-", "*", "/"].contains(&text.at(at));
+                let sign = is_sign && at > from && follows;
                 let calls = ["saturating_", "wrapping_", "checked_", "overflowing_"];
                 let ends = ["add", "sub"];
                 let call = calls.iter().any(|call| text.at(at).starts_with(call));
