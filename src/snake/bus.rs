@@ -170,7 +170,7 @@ impl Joints {
     /// NaN chooses no joint for one update; a second such update in a row relaxes all joints. Frames that disable a joint are sent
     /// nevertheless.
     ///
-    /// Costs 4056 instructions on a Cortex-M4F, for 12 joints, with the frames out and an answer in (`docs/figures.md`).
+    /// Costs 4116 instructions on a Cortex-M4F, for 12 joints, with the frames out and an answer in (`docs/figures.md`).
     pub fn update(&mut self, tick: Tick) {
         let before = self.guard.begin(tick.now());
         let moves_on = self.guard.moves_on(before);
