@@ -1,4 +1,4 @@
-//! What the ESCs did while no command reached them.
+//! The longest time without a command to the ESCs.
 
 use super::scenario::{Sample, at, seconds_of};
 use drivetrain::chassis::MecanumWheels;

@@ -146,7 +146,7 @@ impl ArmError {
     }
 }
 
-/// What stands against arming some motors, beside the emergency stop.
+/// The reasons against arming some motors, beside the emergency stop.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Obstacles {
     pub(crate) has_motors: bool,

@@ -294,7 +294,7 @@ impl Guard {
         goes_on
     }
 
-    /// Has the rules applied at this time, if not before.
+    /// Ends the quiet time here, if the quiet time lasts longer: the next update then applies the rules.
     pub(super) fn wake_at(&mut self, time: Instant) {
         self.device.wake_at(time);
     }

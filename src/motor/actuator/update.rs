@@ -1,4 +1,4 @@
-//! What a motor does with a frame of its drive, and in an update.
+//! The reaction of a motor to a frame of its drive, and its update.
 
 use super::joint::{Inside, Reading, Start};
 use super::{Actuator, DriveProtocol, INQUIRY, Offered, SILENCE_US};
