@@ -120,38 +120,26 @@ impl Text {
 
     /// The place of the bracket that closes the one at `open`.
     fn closing(&self, open: usize) -> usize {
-        let mut depth = 0;
-        for place in open..self.tokens.len() {
-            match self.at(place) {
-                "(" | "[" | "{" => depth += 1,
-                ")" | "]" | "}" => {
-                    depth -= 1;
-                    if depth == 0 {
-                        return place;
-                    }
-                }
-                _ => {}
-            }
-        }
-        self.tokens.len()
+        self.partner(open..self.tokens.len()).unwrap_or(self.tokens.len())
     }
 
     /// The place of the bracket that opens the one at `close`.
     fn opening(&self, close: usize) -> usize {
+        self.partner((0..=close).rev()).unwrap_or(0)
+    }
+
+    /// The place of the bracket that belongs to the first bracket.
+    fn partner(&self, mut places: impl Iterator<Item = usize>) -> Option<usize> {
         let mut depth = 0;
-        for place in (0..=close).rev() {
-            match self.at(place) {
-                ")" | "]" | "}" => depth += 1,
-                "(" | "[" | "{" => {
-                    depth -= 1;
-                    if depth == 0 {
-                        return place;
-                    }
-                }
-                _ => {}
-            }
-        }
-        0
+        places.find(|place| {
+            let change = match self.at(*place) {
+                "(" | "[" | "{" => 1,
+                ")" | "]" | "}" => -1,
+                _ => 0,
+            };
+            depth += change;
+            change != 0 && depth == 0
+        })
     }
 
     /// The first place from `from` on, outside of brackets that open there, whose token stops; the end of the text otherwise.
