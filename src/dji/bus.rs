@@ -42,7 +42,7 @@ use core::marker::PhantomData;
 /// assert_eq!(format!("{frame:?}"), "200 [8] 03 33 00 00 00 00 00 00"); // 819 of 16384 = 1 A of 20 A
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-/// Takes 3552 bytes on a Cortex-M4F, with its 11 places (`docs/figures.md`).
+/// Takes 3544 bytes on a Cortex-M4F, with its 11 places (`docs/figures.md`).
 #[derive(Debug)]
 // The motors first: their addresses then need no offset.
 #[repr(C)]
@@ -314,12 +314,11 @@ impl<B, const N: usize> Bus<B, N> {
     pub fn update(&mut self, tick: Tick) {
         let before = self.motors.guard.begin(tick.now());
         let Some(step) = TimeStep::usable(tick.dt_s(), TimeStep::MOTOR_MAX_S) else {
-            let moves_on = self.motors.guard.moves_on(before);
-            return watch::hold(&mut self.motors, &mut self.outbox, before, moves_on);
+            return watch::end_without_step(&mut self.motors, &mut self.outbox, before);
         };
-        let is_quiet = self.motors.guard.is_quiet(before);
+        let is_quiet = self.motors.guard.is_quiet(before, self.motors.guard.updated());
         if !is_quiet && !watch::apply_due(&mut self.motors, &mut self.outbox, before) {
-            return watch::hold(&mut self.motors, &mut self.outbox, before, false);
+            return;
         }
         self.check_next();
         let mut rest = self.motors.taken_mut();
@@ -368,7 +367,7 @@ impl<B, const N: usize> Bus<B, N> {
             bad_length: self.rejects.bad_length,
             bad_field: self.rejects.bad_field,
             unattached: self.rejects.unattached,
-            bad_steps: self.motors.guard.bad_steps(),
+            bad_steps: self.motors.bad_steps,
             packed: self.outbox.packed,
             superseded: self.outbox.superseded,
         }

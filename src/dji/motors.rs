@@ -5,7 +5,7 @@ use super::slot::health::CheckRound;
 use super::slot::{Key, Slot};
 use super::{CommandFrame, Model};
 use crate::frame::CanFrame;
-use crate::motor::{DeviceGuard, TargetError};
+use crate::motor::{DeviceGuard, Guarded, MotorGuard, TargetError};
 use crate::time::Instant;
 use crate::units::{Angle, AngularVelocity};
 use core::marker::PhantomData;
@@ -33,12 +33,24 @@ pub(super) struct Motors<const N: usize> {
     pub(super) slots: [Slot; N],
     pub(super) guard: DeviceGuard<12>,
     pub(super) round: CheckRound,
+    /// Updates without a usable time or step.
+    pub(super) bad_steps: u32,
     /// The slot of each feedback id, from the lowest on; [`NOBODY`](Self::NOBODY) without a motor.
     ///
     /// Not used if there are as many slots as ids: each id then has the slot of its number.
     places: [u8; IDS],
     /// All slots from this one on are free.
     pub(super) used: u8,
+}
+
+impl Guarded for Slot {
+    fn guard(&mut self) -> &mut MotorGuard {
+        &mut self.guard
+    }
+
+    fn follow(&mut self) {
+        self.apply_rules();
+    }
 }
 
 impl<const N: usize> Motors<N> {
@@ -48,6 +60,7 @@ impl<const N: usize> Motors<N> {
         slots: [Slot::FREE; N],
         guard: DeviceGuard::NEW,
         round: CheckRound::NEW,
+        bad_steps: 0,
         places: [Self::NOBODY; IDS],
         used: 0,
     };
@@ -120,14 +133,14 @@ impl<const N: usize> Motors<N> {
 
     /// Returns the slots up to the last slot in use.
     #[inline(always)]
-    pub(super) fn taken(&self) -> &[Slot] {
-        self.slots.get(..usize::from(self.used)).unwrap_or_default()
-    }
-
-    /// As [`taken`](Self::taken), mutable.
-    #[inline(always)]
     pub(super) fn taken_mut(&mut self) -> &mut [Slot] {
         self.slots.get_mut(..usize::from(self.used)).unwrap_or_default()
+    }
+
+    /// Returns the common rules, and the slots up to the last slot in use.
+    pub(super) fn parts(&mut self) -> (&mut DeviceGuard<12>, &mut [Slot]) {
+        let slots = self.slots.get_mut(..usize::from(self.used)).unwrap_or_default();
+        (&mut self.guard, slots)
     }
 
     /// Iterates over the attached motors in the order of their feedback ids, with id and index of the slot.
@@ -160,11 +173,7 @@ impl<const N: usize> Motors<N> {
         change: impl FnOnce(&mut Slot) -> T,
     ) -> Option<T> {
         let slot = self.slots.get_mut(usize::from(index))?;
-        let before = slot.guard.known();
-        let outcome = change(slot);
-        slot.apply_rules();
-        self.guard.note(index, before, &slot.guard, now);
-        Some(outcome)
+        Some(self.guard.change(slot, index, now, change))
     }
 
     /// Sets a target.
@@ -206,11 +215,18 @@ impl<const N: usize> Motors<N> {
         changed.unwrap_or(Err(TargetError::Detached))
     }
 
+    /// Notes feedback before the first update.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn pass_unwatched(&mut self, now: Instant) {
+        let (guard, slots) = self.parts();
+        guard.pass_unwatched(slots, now);
+    }
+
     /// [Changes](Self::change) each slot that may be in use.
     pub(super) fn change_all(&mut self, now: Instant, change: impl Fn(&mut Slot)) {
-        for index in 0..self.used {
-            self.change(index, now, &change);
-        }
+        let (guard, slots) = self.parts();
+        guard.change_all(slots, now, change);
     }
 
     /// Sets the remaining way and the rate of a motor, both measured by another sensor at the time `at`.
@@ -221,10 +237,9 @@ impl<const N: usize> Motors<N> {
         velocity: AngularVelocity,
         at: Instant,
     ) -> Result<(), TargetError> {
-        let guard = &self.guard;
-        let (now, timeouts, at) = (guard.now(), *guard.timeouts(), guard.stamp_of(at));
+        let stamp = self.guard.stamp_of_measurement(at);
         self.change_present(motor, |slot| {
-            slot.set_measured(way.as_radians(), velocity.as_rad_per_s(), at, now, &timeouts)
+            slot.set_measured(way.as_radians(), velocity.as_rad_per_s(), stamp)
         })?;
         // A measured target expires sooner than others.
         self.guard.disturb();

@@ -258,13 +258,6 @@ impl Slot {
         1.0_f32.copysign(self.raw_per_unit)
     }
 
-    /// Handles a time that did not move on. A free slot loses nothing.
-    pub(super) fn lose_time(&mut self) {
-        if self.facts.is_some() {
-            self.guard.lose_time();
-        }
-    }
-
     // Feedback.
 
     /// Takes a feedback frame received at `now`, shortly after the previous one. Otherwise does nothing and returns `false`. A motor that

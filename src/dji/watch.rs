@@ -10,7 +10,7 @@ use super::slot::health::CheckRound;
 use super::slot::{Slot, Surroundings, gap, health};
 use super::{CommandFrame, Feedback};
 use crate::frame::CanFrame;
-use crate::motor::{Ages, Condition, Hold, Ingest, MotorName, Rival};
+use crate::motor::{Condition, Hold, Ingest, MotorName, Rival};
 use crate::time::{Edge, Instant};
 
 /// Takes any frame.
@@ -45,8 +45,7 @@ pub(super) fn ingest<const N: usize>(
         return Ingest::Taken;
     }
     if !running {
-        let before = motors.guard.pass_unwatched(now);
-        forget_bygones(motors, before);
+        motors.pass_unwatched(now);
     }
     let timeouts = *motors.guard.timeouts();
     #[expect(clippy::cast_possible_truncation, reason = "below 11")]
@@ -78,7 +77,7 @@ fn has_nothing_new<const N: usize>(
         && slot.receive(feedback, now.stamp())
 }
 
-/// Applies all due time-outs and keep-alives, and computes the time of the next. Returns `false` if time did not move on.
+/// Applies all due time-outs and keep-alives. If time did not move on, ends the update and returns `false`.
 #[cold]
 #[inline(never)]
 pub(super) fn apply_due<const N: usize>(
@@ -86,79 +85,38 @@ pub(super) fn apply_due<const N: usize>(
     outbox: &mut Outbox,
     before: Instant,
 ) -> bool {
-    if !motors.guard.moves_on(before) {
-        return false;
-    }
-    if motors.guard.is_pause(before) {
-        forget_bygones(motors, before);
-    }
-    motors.guard.run();
     let keep_alive_us = outbox.keep_alive(motors.guard.now());
-    let ages = motors.guard.ages().map(|ages| add_ages(motors, ages));
-    if let Some(micros) = ages.and_then(|ages| ages.within_limits_us()) {
-        motors.guard.rest_for(micros.min(keep_alive_us));
-    } else {
-        expire(motors);
+    let (guard, slots) = motors.parts();
+    let held = guard.pass(slots, before, true, keep_alive_us);
+    if held.is_err() {
+        finish(motors, outbox, held);
     }
-    true
+    held.is_ok()
 }
 
-fn add_ages<const N: usize>(motors: &Motors<N>, mut ages: Ages) -> Ages {
-    let mut rest = motors.taken();
-    while let [slot, others @ ..] = rest {
-        ages.add(&slot.guard);
-        rest = others;
-    }
-    ages
-}
-
-/// Compares the ages of each motor with their limits.
+/// Ends an update without a usable time step.
 #[cold]
 #[inline(never)]
-fn expire<const N: usize>(motors: &mut Motors<N>) {
-    let (now, updated, timeouts) =
-        (motors.guard.now(), motors.guard.updated(), *motors.guard.timeouts());
-    for index in 0..motors.used {
-        if motors.change(index, updated, |slot| slot.guard.age(now, &timeouts)) == Some(false) {
-            motors.guard.disturb();
-        }
-    }
-}
-
-/// Discards each stamp whose age a 32-bit counter can no longer represent; after a pause, discards all stamps.
-///
-/// Call this wherever time passes without a comparison of ages.
-#[cold]
-#[inline(never)]
-pub(super) fn forget_bygones<const N: usize>(motors: &mut Motors<N>, before: Instant) {
-    let (now, is_pause) = (motors.guard.updated(), motors.guard.is_pause(before));
-    motors.change_all(now, |slot| slot.guard.forget_bygones(now.stamp(), is_pause));
-}
-
-/// Ends an update without a usable time or time step.
-#[cold]
-#[inline(never)]
-pub(super) fn hold<const N: usize>(
+pub(super) fn end_without_step<const N: usize>(
     motors: &mut Motors<N>,
     outbox: &mut Outbox,
     before: Instant,
-    moves_on: bool,
 ) {
-    forget_bygones(motors, before);
-    match motors.guard.hold(before, moves_on) {
-        Hold::Keep => {}
-        Hold::Rest => outbox.clear(),
-        Hold::LoseTime => {
-            motors.change_all(motors.guard.updated(), |slot| slot.lose_time());
-            outbox.clear();
-            return outbox.finish_update();
-        }
+    outbox.keep_alive(motors.guard.now());
+    let (guard, slots) = motors.parts();
+    let held = guard.pass(slots, before, false, 0);
+    finish(motors, outbox, held);
+}
+
+fn finish<const N: usize>(motors: &mut Motors<N>, outbox: &mut Outbox, held: Result<(), Hold>) {
+    motors.bad_steps = motors.bad_steps.saturating_add(1);
+    if held != Err(Hold::Keep) {
+        outbox.clear();
     }
     // A motor without a target rests at once.
     for slot in motors.slots.iter().filter(|slot| slot.has_rested()) {
         outbox.put(slot.place, 0);
     }
-    outbox.keep_alive(motors.guard.now());
     outbox.finish_update();
 }
 

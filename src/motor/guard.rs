@@ -82,10 +82,7 @@ impl Guard {
     #[inline(never)]
     fn hear_anytime(&mut self, now: Instant) {
         self.device.disturb();
-        if !self.device.is_running() {
-            let before = self.device.pass_unwatched(now);
-            self.forget_bygones(before, now);
-        }
+        self.device.pass_unwatched(core::slice::from_mut(&mut self.motor), now);
         let timeouts = *self.device.timeouts();
         self.change(now, |motor| motor.hear(now.stamp(), &timeouts));
     }
@@ -101,21 +98,13 @@ impl Guard {
         gap_us > self.device.timeouts().late_us()
     }
 
-    fn forget_bygones(&mut self, before: Instant, now: Instant) {
-        let is_pause = self.device.is_pause(before);
-        self.change(now, |motor| motor.forget_bygones(now.stamp(), is_pause));
-    }
-
     /// Changes the motor, and notes the consequences.
     pub(super) fn change<T>(
         &mut self,
         now: Instant,
         change: impl FnOnce(&mut MotorGuard) -> T,
     ) -> T {
-        let before = self.motor.known();
-        let outcome = change(&mut self.motor);
-        self.device.note(0, before, &self.motor, now);
-        outcome
+        self.device.change(&mut self.motor, 0, now, change)
     }
 
     /// Tells whether a new target may be taken. If so, notes its time.
@@ -139,38 +128,22 @@ impl Guard {
     #[inline]
     pub fn drives(&mut self, now: Instant) -> bool {
         let before = self.device.begin(now);
-        (self.device.is_quiet(before) || self.compare_ages(before, now)) && self.motor.drives()
+        (self.device.is_quiet(before, now) || self.compare_ages(before, now)) && self.motor.drives()
     }
 
     /// Applies all due time-outs, and computes the time of the next. Returns `false` if time did not move on.
     #[cold]
     #[inline(never)]
     fn compare_ages(&mut self, before: Instant, now: Instant) -> bool {
-        if !self.device.moves_on(before) {
-            self.end_without_time(before, now);
+        let motors = core::slice::from_mut(&mut self.motor);
+        if self.device.pass(motors, before, true, u32::MAX).is_err() {
             return false;
         }
-        if self.device.is_running() || self.motor.listens() {
-            self.forget_bygones(before, now);
-        }
-        self.device.run();
-        // The range of a motor that is not driven must be open before its stamp repeats.
-        self.motor.share(now.stamp());
-        let timeouts = *self.device.timeouts();
-        let is_settled = self.change(now, |motor| {
+        self.change(now, |motor| {
+            // The range of a motor that is not driven must be open before its stamp repeats.
+            motor.share(now.stamp());
             motor.end_what_is_over();
-            motor.age(now.stamp(), &timeouts)
         });
-        let ages = self.device.ages().filter(|_| is_settled);
-        let quiet = ages.and_then(|mut ages| {
-            ages.add(&self.motor);
-            ages.within_limits_us()
-        });
-        match quiet {
-            Some(micros) => self.device.rest_for(micros),
-            None if is_settled => {}
-            None => self.device.disturb(),
-        }
         true
     }
 
@@ -194,12 +167,7 @@ impl Guard {
     pub(crate) fn lose_time(&mut self, now: Instant) {
         let before = self.device.begin(now);
         self.device.moves_on(before);
-        self.end_without_time(before, now);
-    }
-
-    fn end_without_time(&mut self, before: Instant, now: Instant) {
-        self.device.hold(before, false);
-        self.change(now, MotorGuard::lose_time);
+        self.device.lose_time(core::slice::from_mut(&mut self.motor), before);
     }
 
     /// Trips: discards the target and refuses others until the motor is armed again.

@@ -93,6 +93,6 @@ pub use link::{Link, Timeouts};
 pub(crate) use link::{age, is_near, take_age};
 pub use load::BusLoad;
 pub use safety::OPENING;
-pub(crate) use safety::{Ages, DeviceGuard, Hold, MotorGuard, Repeat, Rest};
+pub(crate) use safety::{DeviceGuard, Guarded, Hold, MotorGuard, Repeat, Rest};
 pub use watch::Vitals;
 pub(crate) use watch::Watch;

@@ -287,7 +287,7 @@ impl Guard {
     /// nothing.
     #[inline]
     pub(super) fn goes_on(&mut self, now: Instant) -> bool {
-        let goes_on = self.device.is_quiet_at(now) && self.motor.drives();
+        let goes_on = self.device.is_quiet(self.device.updated(), now) && self.motor.drives();
         if goes_on {
             self.device.begin(now);
         }

@@ -3,7 +3,7 @@ use super::schedule::{self, Answers};
 use super::slot::{Slot, health};
 use super::{AttachError, Command, Config, Joint, Joints, Register, State};
 use crate::frame::CanFrame;
-use crate::motor::{BusLoad, DeviceGuard, Hold, Ingest, Link, MotorName, Timeouts};
+use crate::motor::{BusLoad, DeviceGuard, Hold, Ingest, Link, MotorGuard, MotorName, Timeouts};
 use crate::time::{Duration, Instant, Tick, TimeStep};
 use embedded_can::Frame;
 
@@ -34,10 +34,11 @@ impl Joints {
             told: IDS - 1,
             written: IDS - 1,
             asked: IDS - 1,
-            guard: DeviceGuard::with(Timeouts::POLLED),
+            guard: DeviceGuard::NEW,
             echoes: false,
             counters: Counters::NONE,
         }
+        .with_timeouts(Timeouts::POLLED)
     }
 
     /// Sets the ages at which feedback and targets count as lost, for joints attached afterwards.
@@ -125,7 +126,7 @@ impl Joints {
 
     /// Takes a frame received at `now`. Runs in constant time.
     ///
-    /// Costs 213 instructions on a Cortex-M4F (`docs/figures.md`).
+    /// Costs 210 instructions on a Cortex-M4F (`docs/figures.md`).
     pub fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
         let index = frame.header().wrapping_sub(1) as usize;
         let Some(slot) = self.slots.get_mut(index) else { return Ingest::Unrelated };
@@ -170,14 +171,13 @@ impl Joints {
     /// NaN chooses no joint for one update; a second such update in a row relaxes all joints. Frames that disable a joint are sent
     /// nevertheless.
     ///
-    /// Costs 4116 instructions on a Cortex-M4F, for 12 joints, with the frames out and an answer in (`docs/figures.md`).
+    /// Costs 3690 instructions on a Cortex-M4F, for 12 joints, with the frames out and an answer in (`docs/figures.md`).
     pub fn update(&mut self, tick: Tick) {
         let before = self.guard.begin(tick.now());
-        let moves_on = self.guard.moves_on(before);
-        if !moves_on || TimeStep::new(tick.dt_s(), ANY_STEP_S).is_hold() {
-            return self.hold(before, moves_on);
+        let has_step = !TimeStep::new(tick.dt_s(), ANY_STEP_S).is_hold();
+        if let Err(hold) = self.guard.pass::<MotorGuard>(&mut [], before, has_step, u32::MAX) {
+            return self.hold(hold);
         }
-        self.guard.run();
         self.now = tick.now();
         self.give_up(Some(self.reply_timeout));
         for index in 0..SLOTS {
@@ -212,10 +212,10 @@ impl Joints {
     }
 
     /// Ends an update without a step: chooses no joint, but disables joints that must rest.
-    fn hold(&mut self, before: Instant, moves_on: bool) {
+    fn hold(&mut self, hold: Hold) {
         count(&mut self.counters.bad_steps);
         let now = self.guard.updated();
-        match self.guard.hold(before, moves_on) {
+        match hold {
             Hold::Keep => {}
             Hold::Rest => (0..SLOTS).for_each(|index| self.relax_at(index)),
             Hold::LoseTime => self.lose_time(now),

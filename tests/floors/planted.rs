@@ -173,7 +173,7 @@ const OTHERS: [(&str, &str); 10] = [
     ),
     (
         "dji/watch.rs",
-        "fn f(motors: &mut Motors<8>, now: Instant) -> bool { let before = motors.guard.begin(now); motors.guard.is_quiet(before) }",
+        "fn f(motors: &mut Motors<8>, now: Instant) -> bool { let before = motors.guard.begin(now); motors.guard.is_quiet(before, now) }",
     ),
     (
         "dji/slot.rs",

@@ -129,6 +129,7 @@ const COUNTS: [(&str, &str, &[&str]); 25] = [
             "ambiguous_gaps",
             "bad_field",
             "bad_length",
+            "bad_steps",
             "packed",
             "saturated",
             "superseded",
@@ -213,17 +214,7 @@ const OWN_NAMES: [(&str, &str, &[&str]); 26] = [
     (
         "dji",
         "the core is asked for each motor",
-        &[
-            "add_ages",
-            "begin_opening",
-            "expire",
-            "hear_rival",
-            "hold",
-            "keep_trip_of_others",
-            "lose_time",
-            "rival_among",
-            "take_edge",
-        ],
+        &["begin_opening", "hear_rival", "keep_trip_of_others", "rival_among", "take_edge"],
     ),
     ("dji", "the time of a command of another node, which the core compares", &["rival_heard"]),
     ("dji", "the integral within the share that the core leaves", &["hold_back", "opened_part"]),
@@ -404,7 +395,7 @@ fn findings(folder: &str, files: &Files, used: &mut BTreeSet<String>) -> Vec<Str
             found.push(format!("{file} refuses to arm"));
         }
         // An update without a step is judged by the one rule about it.
-        let asks = ["Repeat", ".guard.hold("].iter().any(|rule| text.contains(rule));
+        let asks = ["Repeat", ".guard.pass"].iter().any(|rule| text.contains(rule));
         if text.contains("is_hold()") && !asks {
             found.push(format!("{file} has its own rule for a held update"));
         }

@@ -249,22 +249,21 @@ impl Reference {
         // Before its first update, a motor without feedback has no time.
         let is_dated = was_running || self.rules.late_us.is_some();
         let takes_turns = self.rules.bad_step == BadStep::Repeats;
-        // A bus that compares ages anyway leaves a motor offline for its age, and forgets no target of it.
-        let is_compared = takes_turns && !loses_time && has_step;
+        // Where ages are compared anyway, a motor is offline for its age, and no target of it is forgotten.
+        let is_compared = !loses_time && (has_step || !takes_turns);
         let is_pause = now.saturating_sub(before) > LONGEST_PAUSE_US;
-        if is_dated && (!loses_time || takes_turns) && (is_pause || !is_compared) {
+        if is_dated && (is_pause || !is_compared) {
             self.forget_after_a_pause(before, now);
         }
         if loses_time {
             self.lose_time(now);
         }
-        if !loses_time && (has_step || !takes_turns) {
-            if !takes_turns {
-                self.end_what_is_over(now);
-            }
+        if is_compared {
             self.age(now);
             if takes_turns {
                 self.take_turn(now);
+            } else {
+                self.end_what_is_over(now);
             }
         }
         self.is_seen = device_moves_on;

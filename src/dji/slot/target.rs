@@ -5,7 +5,7 @@ use crate::control::Pid;
 use crate::dji::codec::{Range, saturate, to_raw};
 use crate::dji::outbox::Outbox;
 use crate::encoder::Position;
-use crate::motor::{Link, MotorGuard, Rest, TargetError, Timeouts};
+use crate::motor::{Link, Rest, TargetError};
 use crate::time::TimeStep;
 use crate::units::Angle;
 
@@ -116,14 +116,11 @@ impl Slot {
         &mut self,
         way: f32,
         rad_per_s: f32,
-        at: Option<u32>,
-        now: u32,
-        timeouts: &Timeouts,
+        stamp: Option<u32>,
     ) -> Result<(), TargetError> {
         needs(self.has_position_loop())?;
         self.admit(way.is_finite() && rad_per_s.is_finite())?;
-        let Some(stamp) = at.and_then(|at| MotorGuard::stamp_of_measurement(at, now, timeouts))
-        else {
+        let Some(stamp) = stamp else {
             if self.guard.has_target() {
                 self.guard.forget_target();
                 self.apply_rules();

@@ -1,8 +1,8 @@
 //! Rules shared by the motors of a device: time, the request to arm, the emergency stop.
 
-use super::motor::{Known, MotorGuard};
-use super::{LONGEST_PAUSE_US, Repeat};
-use crate::motor::{Journal, Link, Timeouts};
+use super::LONGEST_PAUSE_US;
+use super::motor::{Guarded, MotorGuard};
+use crate::motor::{Journal, Link, Timeouts, age, is_near};
 use crate::time::{Duration, Instant};
 
 const LONGEST_PAUSE: Duration = Duration::from_micros(LONGEST_PAUSE_US as u64);
@@ -15,19 +15,16 @@ pub(crate) struct DeviceGuard<const N: usize> {
     timeouts: Timeouts,
     /// Time of the last update; before the first, time of the last feedback.
     updated: Instant,
-    /// Until this time no age exceeds its limit, except after a [disturbance](Self::disturb).
+    /// Until this time no age exceeds its limit; from the beginning after a [disturbance](Self::disturb).
     quiet_until: Instant,
     /// Time of the last arming: no update lies before it.
     armed_at: Instant,
     gesture: Gesture,
-    /// Whether the next update must compare the ages of each motor.
-    is_disturbed: bool,
     /// Whether there was an update.
     is_running: bool,
     is_stopped: bool,
     /// Updates in a row without a usable step.
     held_steps: u8,
-    bad_steps: u32,
     journal: Journal<N>,
 }
 
@@ -38,7 +35,7 @@ pub(crate) enum Hold {
     Keep,
     /// Send zeros.
     Rest,
-    /// Send zeros, and [relax](MotorGuard::lose_time) all motors until armed again: time did not move on.
+    /// Send zeros: time did not move on, and all motors are relaxed until armed again.
     LoseTime,
 }
 
@@ -50,17 +47,11 @@ impl<const N: usize> DeviceGuard<N> {
         quiet_until: Instant::START,
         armed_at: Instant::START,
         gesture: Gesture::NEW,
-        is_disturbed: true,
         is_running: false,
         is_stopped: false,
         held_steps: 0,
-        bad_steps: 0,
         journal: Journal::EMPTY,
     };
-
-    pub(crate) const fn with(timeouts: Timeouts) -> Self {
-        Self { timeouts, ..Self::NEW }
-    }
 
     pub(crate) const fn set_timeouts(&mut self, timeouts: Timeouts) {
         self.timeouts = timeouts;
@@ -71,12 +62,17 @@ impl<const N: usize> DeviceGuard<N> {
         &self.timeouts
     }
 
-    /// Returns the stamp of a measurement of another sensor; `None` for a measurement too old, or too far ahead.
-    pub(crate) fn stamp_of(&self, at: Instant) -> Option<u32> {
+    /// Returns the stamp of a target measured by another sensor, which expires sooner than others; `None` if measured too long ago, or too
+    /// far ahead.
+    pub(crate) fn stamp_of_measurement(&self, at: Instant) -> Option<u32> {
+        let (now, measured_us) = (self.now, self.timeouts.measured_us());
         // A 32-bit stamp alone would be fresh again every 71 minutes.
-        let is_ahead = self.is_running && at.since(self.updated) > LONGEST_PAUSE;
-        let is_far = is_ahead || self.updated.since(at) > self.timeouts.measured();
-        (!is_far).then(|| at.stamp())
+        if self.is_far(at) || !is_near(now, at.stamp(), measured_us) {
+            return None;
+        }
+        let stamp = at.stamp().wrapping_add(measured_us).wrapping_sub(self.timeouts.command_us());
+        // A stamp ahead has no age.
+        Some(if age(now, stamp) == 0 { now } else { stamp })
     }
 
     /// Returns the stamp of new targets.
@@ -92,10 +88,6 @@ impl<const N: usize> DeviceGuard<N> {
         self.is_running
     }
 
-    pub(crate) const fn bad_steps(&self) -> u32 {
-        self.bad_steps
-    }
-
     pub(crate) const fn journal(&self) -> &Journal<N> {
         &self.journal
     }
@@ -106,6 +98,12 @@ impl<const N: usize> DeviceGuard<N> {
 
     // Time.
 
+    /// Tells whether time moves on from `before`, the time of the previous update, and no age exceeds its limit.
+    #[inline(always)]
+    pub(crate) fn is_quiet(&self, before: Instant, now: Instant) -> bool {
+        before < now && now < self.quiet_until
+    }
+
     /// Sets the time of an update and returns the time of the previous one.
     #[inline(always)]
     pub(crate) const fn begin(&mut self, now: Instant) -> Instant {
@@ -113,25 +111,36 @@ impl<const N: usize> DeviceGuard<N> {
         core::mem::replace(&mut self.updated, now)
     }
 
-    /// Tells whether time moved on since `before`, and no age exceeds its limit.
-    #[inline(always)]
-    pub(crate) fn is_quiet(&self, before: Instant) -> bool {
-        before < self.updated && self.updated < self.quiet_until
+    /// Decides whether an update outside of a [quiet](Self::is_quiet) time, `before` being the time of the previous one, has a usable time
+    /// and step. If so, applies all due time-outs, and computes until when none is due again; otherwise returns the [`Hold`].
+    pub(crate) fn pass<M: Guarded>(
+        &mut self,
+        motors: &mut [M],
+        before: Instant,
+        has_step: bool,
+        longest_us: u32,
+    ) -> Result<(), Hold> {
+        if !self.moves_on(before) {
+            return Err(self.lose_time(motors, before));
+        }
+        if !has_step {
+            return Err(self.hold(motors, before));
+        }
+        if self.is_pause(before) {
+            self.forget_bygones(motors, before);
+        }
+        self.is_running = true;
+        self.held_steps = 0;
+        let quiet_until = core::mem::replace(&mut self.quiet_until, self.updated);
+        match self.quiet(motors, longest_us).filter(|_| quiet_until > Instant::START) {
+            Some(_) if self.gesture.tripped => {}
+            Some(quiet) => self.quiet_until = self.updated + quiet,
+            None => self.expire(motors),
+        }
+        Ok(())
     }
 
-    /// Tells whether time moves on until `now`, and no age exceeds its limit then.
-    #[inline(always)]
-    pub(in crate::motor) fn is_quiet_at(&self, now: Instant) -> bool {
-        self.updated < now && now < self.quiet_until
-    }
-
-    /// Notes feedback before the first update, which moves the time on. Returns the previous time.
-    pub(crate) const fn pass_unwatched(&mut self, now: Instant) -> Instant {
-        core::mem::replace(&mut self.updated, now)
-    }
-
-    /// Tells whether the present update lies after the previous one, and not before the arming; otherwise all ages are meaningless. Call
-    /// this once in each update that is not [quiet](Self::is_quiet).
+    /// Tells whether the present update lies after the previous one, and not before the arming; otherwise all ages are meaningless.
     pub(crate) fn moves_on(&mut self, before: Instant) -> bool {
         let moves_on = self.armed_at <= self.updated && (!self.is_running || before < self.updated);
         let step = if self.is_running { self.updated.since(before) } else { Duration::ZERO };
@@ -140,55 +149,126 @@ impl<const N: usize> DeviceGuard<N> {
     }
 
     /// Tells whether the pause before the present time was too long for the stamps.
-    pub(crate) fn is_pause(&self, before: Instant) -> bool {
+    fn is_pause(&self, before: Instant) -> bool {
         self.updated > before + LONGEST_PAUSE
     }
 
-    /// Notes an update with a usable step, for which time moved on.
-    pub(crate) const fn run(&mut self) {
-        self.is_running = true;
-        self.held_steps = 0;
+    /// Returns the time after which the age of a motor exceeds its limit, at most `longest_us`; `None` if an age already does. A new target
+    /// may come at any time from now on.
+    fn quiet<M: Guarded>(&self, motors: &mut [M], longest_us: u32) -> Option<Duration> {
+        let (late_us, command_us) = (self.timeouts.late_us(), self.timeouts.command_us());
+        // Counted from one limit ahead of now, so that a stamp is near for values from 0 to twice the limit.
+        let since = |stamp, limit| self.now.wrapping_add(limit).wrapping_sub(stamp);
+        let (mut heard, mut commanded) = (0, command_us);
+        for motor in motors.iter_mut().map(M::guard) {
+            let is_online = motor.link == Link::Online;
+            if is_online {
+                heard = since(motor.heard, late_us).max(heard);
+            }
+            if is_online && motor.has_target {
+                commanded = since(motor.commanded, command_us).max(commanded);
+            }
+        }
+        let (heard, commanded) =
+            ((2 * late_us).checked_sub(heard)?, (2 * command_us).checked_sub(commanded)?);
+        Some(Duration::from_micros((heard.min(commanded) + 1).min(longest_us).into()))
     }
 
-    /// Returns the ages of no motor. Returns `None`, once, if each motor must be compared by itself.
-    pub(crate) fn ages(&mut self) -> Option<Ages> {
-        let is_disturbed = core::mem::replace(&mut self.is_disturbed, false);
-        (!is_disturbed).then(|| Ages::none(self.now, &self.timeouts))
+    /// Compares the ages of each motor with their limits.
+    #[cold]
+    fn expire<M: Guarded>(&mut self, motors: &mut [M]) {
+        let (now, timeouts, mut is_settled) = (self.now, self.timeouts, true);
+        self.change_all(motors, self.updated, |motor| {
+            is_settled &= motor.guard().age(now, &timeouts);
+        });
+        if !is_settled {
+            self.disturb();
+        }
     }
 
-    /// Sets for how long no age exceeds its limit.
-    pub(crate) fn rest_for(&mut self, micros: u32) {
-        // After a trip, each update counts towards the pause before a request to arm.
-        let micros = if self.gesture.is_tripped() { 0 } else { micros };
-        self.quiet_until = self.updated + Duration::from_micros(micros.into());
+    /// Discards each stamp whose age a 32-bit counter can no longer represent; after a pause, discards all stamps.
+    ///
+    /// Called wherever time passes without a comparison of ages.
+    fn forget_bygones<M: Guarded>(&mut self, motors: &mut [M], before: Instant) {
+        let (now, is_pause, is_running) =
+            (self.updated.stamp(), self.is_pause(before), self.is_running);
+        self.change_all(motors, self.updated, |motor| {
+            let guard = motor.guard();
+            guard.forget_bygones(now, is_pause && (is_running || guard.listens));
+        });
+    }
+
+    /// Notes feedback before the first update, which moves the time on.
+    pub(crate) fn pass_unwatched<M: Guarded>(&mut self, motors: &mut [M], now: Instant) {
+        if !self.is_running {
+            let before = core::mem::replace(&mut self.updated, now);
+            self.forget_bygones(motors, before);
+        }
+    }
+
+    /// Changes each motor.
+    pub(crate) fn change_all<M: Guarded>(
+        &mut self,
+        motors: &mut [M],
+        now: Instant,
+        mut change: impl FnMut(&mut M),
+    ) {
+        for (index, motor) in (0..).zip(motors) {
+            self.change(motor, index, now, &mut change);
+        }
+    }
+
+    /// Changes a motor, and notes the consequences: edges, and the pause after a trip.
+    pub(crate) fn change<M: Guarded, T>(
+        &mut self,
+        motor: &mut M,
+        index: u8,
+        now: Instant,
+        change: impl FnOnce(&mut M) -> T,
+    ) -> T {
+        let (latch, was_armed) = (*motor.guard().latch(), motor.guard().is_armed());
+        let outcome = change(motor);
+        motor.follow();
+        self.journal.note(index, &latch, motor.guard().latch(), now);
+        if was_armed && !motor.guard().is_armed() {
+            self.trip();
+        }
+        outcome
     }
 
     /// Counts as quiet until this time at most.
-    pub(in crate::motor) fn wake_at(&mut self, time: Instant) {
-        self.quiet_until = self.quiet_until.min(time);
+    pub(crate) const fn wake_at(&mut self, time: Instant) {
+        if time.as_micros() < self.quiet_until.as_micros() {
+            self.quiet_until = time;
+        }
     }
 
     /// Makes the next update compare the ages of each motor. Call this wherever an age may grow faster than time, or the limit of an age
     /// may change.
     pub(crate) const fn disturb(&mut self) {
         self.quiet_until = Instant::START;
-        self.is_disturbed = true;
     }
 
-    /// Ends an update without a usable time or time step, after the check by [`moves_on`](Self::moves_on).
-    pub(crate) fn hold(&mut self, before: Instant, moves_on: bool) -> Hold {
+    /// Ends an update without a usable step.
+    #[cold]
+    fn hold<M: Guarded>(&mut self, motors: &mut [M], before: Instant) -> Hold {
+        self.forget_bygones(motors, before);
         self.is_running = true;
         self.disturb();
-        self.bad_steps = self.bad_steps.saturating_add(1);
-        let repeat = Repeat::after(self.held_steps);
+        let (repeats, is_late) =
+            (self.held_steps == 0, self.updated.since(before) > self.timeouts.late());
         self.held_steps = self.held_steps.saturating_add(1);
-        if !moves_on {
-            // No target is left, so an update before the arming can make no target younger.
-            self.armed_at = self.updated;
-            return Hold::LoseTime;
-        }
-        let is_late = self.updated.since(before) > self.timeouts.late();
-        if repeat.admits(true) && !is_late { Hold::Keep } else { Hold::Rest }
+        if repeats && !is_late { Hold::Keep } else { Hold::Rest }
+    }
+
+    /// Ends an update whose time did not move on: no age is known.
+    #[cold]
+    pub(crate) fn lose_time<M: Guarded>(&mut self, motors: &mut [M], before: Instant) -> Hold {
+        self.hold(motors, before);
+        // No target is left, so an update before the arming can make no target younger.
+        self.armed_at = self.updated;
+        self.change_all(motors, self.updated, |motor| motor.guard().lose_time());
+        Hold::LoseTime
     }
 
     /// Returns the number of updates in a row without a usable time or step.
@@ -200,7 +280,7 @@ impl<const N: usize> DeviceGuard<N> {
 
     /// Tells whether a motor's feedback is not fresh, as far as its stamp is valid.
     pub(crate) fn misses(&self, motor: &MotorGuard, now: Instant) -> bool {
-        let is_dated = self.is_running || motor.listens();
+        let is_dated = self.is_running || motor.listens;
         is_dated && self.is_far(now) || motor.is_missing(now.stamp(), &self.timeouts)
     }
 
@@ -237,80 +317,29 @@ impl<const N: usize> DeviceGuard<N> {
         self.gesture.keep();
     }
 
-    /// Notes the consequences of a change of a motor, compared with the state [known](MotorGuard::known) before: edges, and the pause after
-    /// a trip.
-    pub(crate) fn note(&mut self, index: u8, before: Known, motor: &MotorGuard, now: Instant) {
-        self.journal.note(index, &before.latch, motor.latch(), now);
-        if before.is_armed && !motor.is_armed() {
-            self.trip();
-        }
-    }
-
     /// Begins the pause after a trip. Each update counts towards it.
     pub(crate) const fn trip(&mut self) {
         self.gesture.trip();
-        self.quiet_until = Instant::START;
+        self.wake_at(self.updated);
     }
 
     /// Sets the emergency stop. Returns `false` if the stop is set already. The caller disarms the motors.
     pub(crate) const fn stop(&mut self) -> bool {
-        if self.is_stopped {
+        if core::mem::replace(&mut self.is_stopped, true) {
             return false;
         }
         self.trip();
-        self.is_stopped = true;
         true
     }
 
     pub(crate) const fn clear_stop(&mut self) {
-        if self.is_stopped {
+        if core::mem::replace(&mut self.is_stopped, false) {
             self.trip();
-            self.is_stopped = false;
         }
     }
 
     pub(crate) const fn is_stopped(&self) -> bool {
         self.is_stopped
-    }
-}
-
-/// Greatest ages among some motors. An age is counted from one limit ahead of now, so a stamp is near for values from 0 to twice the limit.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Ages {
-    now: u32,
-    late_us: u32,
-    command_us: u32,
-    heard: u32,
-    commanded: u32,
-}
-
-impl Ages {
-    /// Returns the ages of no motor. A new target may come at any time from now on.
-    pub(in crate::motor) const fn none(now: u32, timeouts: &Timeouts) -> Self {
-        let (late_us, command_us) = (timeouts.late_us(), timeouts.command_us());
-        Self { now, late_us, command_us, heard: 0, commanded: command_us }
-    }
-
-    /// Adds the ages of a motor's feedback and target, if the motor is online.
-    #[inline]
-    pub(crate) fn add(&mut self, motor: &MotorGuard) {
-        if motor.link != Link::Online {
-            return;
-        }
-        let since = |stamp, limit| self.now.wrapping_add(limit).wrapping_sub(stamp);
-        let heard = since(motor.heard, self.late_us);
-        let commanded = since(motor.commanded, self.command_us);
-        self.heard = self.heard.max(heard);
-        if motor.has_target {
-            self.commanded = self.commanded.max(commanded);
-        }
-    }
-
-    /// Returns the time in µs after which an age exceeds its limit; `None` if an age already does.
-    pub(crate) fn within_limits_us(&self) -> Option<u32> {
-        let heard = (2 * self.late_us).checked_sub(self.heard)?;
-        let commanded = (2 * self.command_us).checked_sub(self.commanded)?;
-        Some(heard.min(commanded) + 1)
     }
 }
 
@@ -320,9 +349,9 @@ impl Ages {
 /// that stays on, read in each tick, does not re-arm. A program that reads its switch more slowly must detect the edge of the switch.
 ///
 /// The pause consists of updates whose time moved on. A gap between two updates counts for no more than
-/// [`LONGEST_STEP_US`](Self::LONGEST_STEP_US): a stall of the program, or a jump of its clock, is no release of the switch.
+/// [`MOST_US`](Self::MOST_US): a stall of the program, or a jump of its clock, is no release of the switch.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Gesture {
+struct Gesture {
     /// Time of the updates since the last request or trip.
     quiet_us: u32,
     /// Whether a motor was relaxed since arming, and waits to be armed again.
@@ -334,45 +363,37 @@ pub(crate) struct Gesture {
 impl Gesture {
     /// Pause without requests before a request that counts.
     const PAUSE_US: u32 = 100_000;
-    const LONGEST_STEP_US: u32 = 20_000;
+    const MOST_US: u32 = 20_000;
 
-    pub(crate) const NEW: Self = Self { quiet_us: 0, tripped: false, granted: false };
+    const NEW: Self = Self { quiet_us: 0, tripped: false, granted: false };
 
     /// Notes an update, `step` after the previous one. `None`, for a time that did not move on, begins the pause anew.
-    pub(crate) fn pass(&mut self, step: Option<Duration>) {
-        let step_us = step.map(|step| step.micros_u32().unwrap_or(u32::MAX));
-        self.quiet_us = step_us
-            .map_or(0, |step_us| self.quiet_us.saturating_add(step_us.min(Self::LONGEST_STEP_US)));
+    fn pass(&mut self, step: Option<Duration>) {
+        let micros = |step: Duration| step.micros_u32().unwrap_or(u32::MAX).min(Self::MOST_US);
+        self.quiet_us = step.map_or(0, |step| self.quiet_us.saturating_add(micros(step)));
     }
 
-    /// Notes a trip: a motor was relaxed until armed again.
-    pub(crate) const fn trip(&mut self) {
+    const fn trip(&mut self) {
         *self = Self { quiet_us: 0, tripped: true, granted: false };
     }
 
-    /// Takes a request to arm. Returns `false` if the request does not count.
-    pub(crate) const fn ask(&mut self) -> bool {
+    /// As [`DeviceGuard::ask`].
+    const fn ask(&mut self) -> bool {
         self.granted = !self.tripped || self.quiet_us >= Self::PAUSE_US;
         self.quiet_us = 0;
         self.granted
     }
 
-    /// Keeps the trip: another motor of the device still waits to be armed.
-    pub(crate) const fn keep(&mut self) {
-        self.tripped = true;
-        self.granted = false;
+    /// As [`DeviceGuard::keep_trip`].
+    const fn keep(&mut self) {
+        (self.tripped, self.granted) = (true, false);
     }
 
     /// Tells whether the device may be armed. If so, ends the trip.
-    pub(crate) const fn take(&mut self) -> bool {
+    const fn take(&mut self) -> bool {
         let is_free = !self.tripped || self.granted;
         self.tripped = self.tripped && !is_free;
         is_free
-    }
-
-    /// Tells whether updates must be [noted](Self::pass): a request counts only after a pause.
-    pub(crate) const fn is_tripped(&self) -> bool {
-        self.tripped
     }
 }
 
@@ -390,11 +411,18 @@ mod tests {
         /// Law: nothing is above its limit for as long as it is told, and something is a microsecond later.
         #[test]
         fn it_is_quiet_until_the_oldest_age_is_above_its_limit(heard in about(20_000), commanded in about(200_000)) {
-            let ages = Ages { heard, commanded, ..Ages::none(0, &Timeouts::new()) };
-            // 10 ms and 100 ms, and as far ahead.
+            let mut motor = MotorGuard::NEW;
+            motor.hear(10_000_u32.wrapping_sub(heard), &Timeouts::new());
+            motor.take_target(100_000_u32.wrapping_sub(commanded));
+            let device = DeviceGuard::<0>::NEW;
+            // 10 ms and 100 ms, and as far ahead; a target may come at any time.
+            let commanded = commanded.max(100_000);
             let is_within = |passed| heard + passed <= 20_000 && commanded + passed <= 200_000;
-            match ages.within_limits_us() {
-                Some(quiet) => prop_assert!(is_within(quiet - 1) && !is_within(quiet)),
+            match device.quiet(&mut [motor], u32::MAX) {
+                Some(quiet) => {
+                    let quiet = quiet.micros_u32().unwrap();
+                    prop_assert!(is_within(quiet - 1) && !is_within(quiet));
+                }
                 None => prop_assert!(!is_within(0)),
             }
         }

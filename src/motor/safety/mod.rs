@@ -5,8 +5,8 @@
 //!
 //! | question | decided by | if not |
 //! |---|---|---|
-//! | did time move on since the previous update, and is the update not before the arming? | `DeviceGuard::moves_on` | zeros in this cycle, all motors trip |
-//! | is the time step usable? | `DeviceGuard::hold`, [`Repeat`] | the last commands once, then zeros |
+//! | did time move on since the previous update, and is the update not before the arming? | `DeviceGuard::pass` | zeros in this cycle, all motors trip |
+//! | is the time step usable? | `DeviceGuard::pass`, [`Repeat`] | the last commands once, then zeros |
 //! | is the feedback fresh? | `MotorGuard::age` | late: zero until the next feedback; offline: relaxed and latched |
 //! | is the motor armed, by a gesture? | `MotorGuard::admit`, `DeviceGuard::begin_arming` | no target is taken |
 //! | is there a target that is not expired? | `MotorGuard::age` | relaxed |
@@ -15,7 +15,7 @@
 //! The [health](super::HealthConfig) of a family finds faults, a second master, heat and a stall. Each acts by [`MotorGuard::trip`]. The tables
 //! of links and of arming, with all transitions, stand in the documentation of [`motor`](super#states).
 //!
-//! Times of a motor are stamps of 32 bits. Ages of several motors are compared together ([`Ages`]): no motor is checked again before the
+//! Times of a motor are stamps of 32 bits. Ages of several motors are compared together: no motor is checked again before the
 //! greatest age can have exceeded its limit.
 
 mod device;
@@ -23,8 +23,8 @@ mod motor;
 
 use crate::time::Duration;
 
-pub(crate) use device::{Ages, DeviceGuard, Hold};
-pub(crate) use motor::MotorGuard;
+pub(crate) use device::{DeviceGuard, Hold};
+pub(crate) use motor::{Guarded, MotorGuard};
 
 /// Default time in which the output range of a motor opens after arming: 0.2 s.
 pub const OPENING: Duration = Duration::from_millis(200);
@@ -61,11 +61,6 @@ impl Repeat {
     /// The last update gave a command.
     pub(crate) const ONCE: Self = Self(true);
 
-    /// After so many updates in a row without a usable step.
-    const fn after(held_steps: u8) -> Self {
-        Self(held_steps == 0)
-    }
-
     /// After an update, which drove the motor or not, with a usable step or without.
     pub(crate) const fn after_update(drove: bool, is_hold: bool) -> Self {
         Self(drove && !is_hold)
@@ -92,10 +87,3 @@ impl Repeat {
 
 /// Longest pause between two checks for which a 32-bit stamp still represents an age.
 const LONGEST_PAUSE_US: u32 = 60_000_000;
-
-/// Returns whole milliseconds, at most 65 s.
-const fn whole_ms(time: Duration) -> u16 {
-    let millis = time.as_micros() / 1_000;
-    #[expect(clippy::cast_possible_truncation, reason = "limited before")]
-    if millis < 65_000 { millis as u16 } else { 65_000 }
-}

@@ -1,15 +1,8 @@
 //! Rules of one motor.
 
-use super::{Arming, LONGEST_PAUSE_US, Rest, whole_ms};
+use super::{Arming, LONGEST_PAUSE_US, Rest};
 use crate::motor::{Condition, Latch, Link, TargetError, Timeouts, age, is_near};
 use crate::time::Duration;
-
-/// State of a motor before a change, for its device.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Known {
-    pub(super) latch: Latch,
-    pub(super) is_armed: bool,
-}
 
 /// Counts up to 32 767, or 4 s of a bus full of frames of one motor. The count is taken each second. Each overflow would lengthen the gap
 /// by 1 µs, for a minute at most: after a longer pause between two updates no age is known.
@@ -39,12 +32,26 @@ pub(crate) struct MotorGuard {
     is_opening: bool,
     good_frames: u8,
     /// Whether the motor has feedback.
-    listens: bool,
+    pub(super) listens: bool,
     /// Whether targets are taken again after a recovery.
     resumes: bool,
     refused_targets: u16,
     forgotten_targets: u16,
     latch: Latch,
+}
+
+/// A motor of a device, under the rules of its guard.
+pub(crate) trait Guarded {
+    fn guard(&mut self) -> &mut MotorGuard;
+
+    /// Takes the consequences of a change of the guard.
+    fn follow(&mut self) {}
+}
+
+impl Guarded for MotorGuard {
+    fn guard(&mut self) -> &mut MotorGuard {
+        self
+    }
 }
 
 impl MotorGuard {
@@ -69,12 +76,14 @@ impl MotorGuard {
     };
 
     /// A motor without feedback, which counts as online.
-    pub(in crate::motor) const DEAF: Self =
-        Self { listens: false, link: Link::Online, ..Self::NEW };
+    pub(crate) const DEAF: Self = Self { listens: false, link: Link::Online, ..Self::NEW };
 
     /// Sets the time in which the output range opens, at most 65 s, and whether targets are taken again after a recovery.
     pub(crate) const fn with(self, opening: Duration, resumes: bool) -> Self {
-        Self { opening_ms: whole_ms(opening), resumes, ..self }
+        let millis = opening.as_micros() / 1_000;
+        #[expect(clippy::cast_possible_truncation, reason = "limited before")]
+        let opening_ms = if millis < 65_000 { millis as u16 } else { 65_000 };
+        Self { opening_ms, resumes, ..self }
     }
 
     pub(crate) const fn link(&self) -> Link {
@@ -117,21 +126,12 @@ impl MotorGuard {
         self.forgotten_targets
     }
 
-    /// Returns the state to [compare](super::DeviceGuard::note) with after a change.
-    pub(crate) const fn known(&self) -> Known {
-        Known { latch: self.latch, is_armed: self.is_armed() }
-    }
-
     pub(crate) const fn latch(&self) -> &Latch {
         &self.latch
     }
 
     pub(crate) const fn latch_mut(&mut self) -> &mut Latch {
         &mut self.latch
-    }
-
-    pub(in crate::motor) const fn listens(&self) -> bool {
-        self.listens
     }
 
     /// Tells whether the feedback is not fresh.
@@ -208,27 +208,19 @@ impl MotorGuard {
 
     /// Applies expired time-outs. Returns `false` if the motor must be checked again on the next update regardless of new input.
     pub(crate) fn age(&mut self, now: u32, timeouts: &Timeouts) -> bool {
-        let is_settled = match self.link {
-            Link::Unheard | Link::Offline => return true,
-            Link::Online if self.is_fresh(now, timeouts) => true,
-            Link::Online | Link::Late | Link::Recovering => {
-                self.grow_old(now, timeouts);
-                false
-            }
-        };
+        if matches!(self.link, Link::Unheard | Link::Offline) {
+            return true;
+        }
+        let is_settled = self.link == Link::Online && self.is_fresh(now, timeouts);
+        if !is_settled && age(now, self.heard) > timeouts.offline_us() {
+            self.lose();
+        } else if !is_settled && self.link == Link::Online {
+            self.set_late();
+        }
         if self.has_target && !is_near(now, self.commanded, timeouts.command_us()) {
             self.forget_target();
         }
         is_settled
-    }
-
-    /// Applies the age of feedback that is not fresh: late, or lost.
-    fn grow_old(&mut self, now: u32, timeouts: &Timeouts) {
-        if age(now, self.heard) > timeouts.offline_us() {
-            self.lose();
-        } else if self.link == Link::Online {
-            self.set_late();
-        }
     }
 
     fn set_late(&mut self) {
@@ -240,9 +232,8 @@ impl MotorGuard {
 
     /// Handles a lost motor: relaxes, and refuses targets until armed again or, if configured, until recovered.
     fn lose(&mut self) {
+        self.set_late();
         self.link = Link::Offline;
-        self.in_time &= COUNT;
-        self.latch.set(Condition::Late, true);
         self.latch.set(Condition::Offline, true);
         if self.is_armed() {
             self.arming = Arming::Latched;
@@ -323,17 +314,6 @@ impl MotorGuard {
         self.commanded = now;
     }
 
-    /// Returns the stamp of a target that belongs to a measurement of another sensor, taken at `at`: the target expires with the
-    /// measurement. Returns `None` if the measurement is too old already.
-    pub(crate) const fn stamp_of_measurement(at: u32, now: u32, limits: &Timeouts) -> Option<u32> {
-        if !is_near(now, at, limits.measured_us()) {
-            return None;
-        }
-        let stamp = at.wrapping_add(limits.measured_us()).wrapping_sub(limits.command_us());
-        // A stamp ahead has no age.
-        Some(if age(now, stamp) == 0 { now } else { stamp })
-    }
-
     /// Discards the target.
     pub(crate) const fn relax(&mut self) {
         self.has_target = false;
@@ -387,11 +367,8 @@ impl MotorGuard {
 
     /// Returns the open share of the output range, 0 to 1; 0 for a time before the beginning.
     pub(crate) fn share(&mut self, now: u32) -> f32 {
-        if !self.is_opening {
-            return 1.0;
-        }
         let (passed, whole) = (age(now, self.opened), u32::from(self.opening_ms) * 1_000);
-        self.is_opening = passed < whole;
+        self.is_opening &= passed < whole;
         if self.is_opening { passed as f32 / whole as f32 } else { 1.0 }
     }
 }
