@@ -169,9 +169,9 @@ impl<const N: usize> DeviceGuard<N> {
                 commanded = since(motor.commanded, command_us).max(commanded);
             }
         }
-        let (heard, commanded) =
-            ((2 * late_us).checked_sub(heard)?, (2 * command_us).checked_sub(commanded)?);
-        Some(Duration::from_micros((heard.min(commanded) + 1).min(longest_us).into()))
+        let quiet_us =
+            (2 * late_us).checked_sub(heard)?.min((2 * command_us).checked_sub(commanded)?);
+        Some(Duration::from_micros((quiet_us + 1).min(longest_us).into()))
     }
 
     /// Compares the ages of each motor with their limits.
