@@ -263,6 +263,23 @@ fn gains_of_a_drive_in_mit_mode_have_their_own_ranges() {
     );
 }
 
+#[test]
+fn two_fields_of_the_same_bits_are_a_command_and_no_torque_alone() {
+    for (one, other) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
+        let mut both = [0.0; 5];
+        (both[one], both[other]) = (2.0, 2.0);
+        let alone = |place: usize| {
+            let mut fields = [0.0; 5];
+            fields[place] = 2.0;
+            counts(ranges().encode(&command(fields)))[place]
+        };
+        let rest = counts(ranges().encode(&Impedance::FREE));
+        let sent = counts(ranges().encode(&command(both)));
+        assert_eq!([sent[one], sent[other]], [alone(one), alone(other)], "{one} {other}");
+        assert!(sent[one] > rest[one] && sent[other] > rest[other], "{one} {other}");
+    }
+}
+
 proptest! {
     /// Law: a torque alone has the bytes of the same command with a gain below a count, which takes the way of all fields.
     #[test]

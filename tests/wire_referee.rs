@@ -7,7 +7,7 @@ use drivetrain::chassis::CapacitorPlan;
 use drivetrain::frame::CanFrame;
 use drivetrain::time::{Duration, Edge, Instant};
 use drivetrain::wire::dbus::Keys;
-use drivetrain::wire::referee::{MAX_FRAME, Referee, RefereeMessage, encode};
+use drivetrain::wire::referee::{BarrelHeat, MAX_FRAME, Referee, RefereeMessage, encode};
 use drivetrain::wire::supercap::{hkust, pacific_spirit};
 use drivetrain::wire::vt13::{DEAD_BAND, FRAME_LENGTH, VideoRemote};
 use drivetrain::wire::{Counts, Decode, Deframer, Receiver};
@@ -238,7 +238,21 @@ fn the_deadlines_can_be_set_and_half_a_frame_given_up() {
     }
     assert_eq!((watts(&referee, 2_020), watts(&referee, 2_021)), (80, 45));
     assert!(referee.buffer_energy_j(ms(2_020)).is_some());
+    let heat = BarrelHeat { heat: 0, limit: 100, cooling_per_s: 40 };
+    assert_eq!(referee.heat_17mm(ms(2_020)), Some(heat));
+    assert_eq!(referee.heat_17mm(ms(2_021)), None);
     assert_eq!((referee.counts().frames, referee.counts().skipped_bytes), (4, 10));
+}
+
+#[test]
+fn a_frame_behind_a_header_that_promises_more_is_found_after_a_pause() {
+    let promises = encode(0x0310, 0, &[0; 128], &mut [0; MAX_FRAME]).unwrap()[..9].to_vec();
+    let mut referee = Referee::new(45);
+    tell(&mut referee, &[promises, robot(30)].concat(), ms(0));
+    assert_eq!((referee.counts().frames, watts(&referee, 0)), (0, 45));
+    referee.abandon();
+    tell(&mut referee, &[], ms(10));
+    assert_eq!((referee.counts().frames, watts(&referee, 10)), (1, 30));
 }
 
 proptest! {
@@ -447,6 +461,12 @@ fn supercap_frames_of_pacific_spirit() {
     assert!((state.discharge_w - float(&expect["discharge_w"])).abs() < 1e-4);
     assert!((state.supply_w - float(&expect["supply_w"])).abs() < 1e-4);
     assert_eq!(state.energy(), Some(0.0), "a little below zero");
+    for (percent, share) in [(1, 0.01), (80, 0.8), (100, 1.0), (110, 1.0)] {
+        let data = [0, 0, 0, 0, percent, 0, 2, 0];
+        let frame = CanFrame::standard(pacific_spirit::STATE_ID, data).unwrap();
+        let energy = pacific_spirit::decode(&frame).and_then(|state| state.energy());
+        assert_eq!(energy, Some(share), "{percent} %");
+    }
 }
 
 #[test]

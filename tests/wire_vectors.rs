@@ -2,8 +2,9 @@
 
 #![cfg(test)]
 
+use drivetrain::geometry::{Attitude, AttitudeSource};
 use drivetrain::motor::Impedance;
-use drivetrain::time::Instant;
+use drivetrain::time::{Duration, Instant};
 use drivetrain::units::{Angle, AngularVelocity};
 use drivetrain::wire::dbus::{Dbus, Keys, Switch};
 use drivetrain::wire::feetech::{self, Goal, Present, ServoId, Status, register};
@@ -12,7 +13,7 @@ use drivetrain::wire::host_link::{
     COMMAND_LENGTH, HostCommand, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
 };
 use drivetrain::wire::mit;
-use drivetrain::wire::{Counts, Decode, Deframer};
+use drivetrain::wire::{Counts, Decode, Deframer, Receiver};
 use serde_json::Value;
 
 fn vector(id: &str) -> Value {
@@ -81,6 +82,19 @@ fn hipnuc_91_frames_of_both_manuals() {
         close(&[imu.pressure_pa], &expect["pressure_pa"], 0.01);
         assert_eq!(imu.time_ms.map(i64::from), expect["system_time_ms"].as_i64());
     }
+}
+
+#[test]
+fn hipnuc_is_a_source_of_attitude_until_it_falls_silent() {
+    let id = "hipnuc.hi91.manual_7_34";
+    let (frame, imu) = (hex(&vector(id)["input"]["frame"]), imu(id));
+    let ms = |ms| Instant::START + Duration::from_millis(ms);
+    let mut receiver = Receiver::<Imu, 128>::new(Duration::from_millis(50));
+    assert_eq!(receiver.attitude(ms(1)), None);
+    assert!(receiver.read(&mut &frame[..], ms(1)).is_some());
+    let expected = Attitude { rotation: imu.attitude, rates: imu.angular_velocity };
+    assert_eq!(receiver.attitude(ms(51)), Some(expected));
+    assert_eq!(receiver.attitude(ms(52)), None);
 }
 
 #[test]

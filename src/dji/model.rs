@@ -286,6 +286,13 @@ mod tests {
     }
 
     #[test]
+    fn each_model_has_the_two_command_ids_of_the_manual() {
+        let facts = [M2006::FACTS, M3508::FACTS, Gm6020Voltage::FACTS, Gm6020Current::FACTS];
+        let expected = [[0x200, 0x1FF], [0x200, 0x1FF], [0x1FF, 0x2FF], [0x1FE, 0x2FE]];
+        assert_eq!(facts.map(Facts::command_ids), expected);
+    }
+
+    #[test]
     fn every_word_is_an_output_and_back_and_what_is_beyond_is_the_end() {
         for facts in ALL_FACTS {
             let most = facts.command_raw;
@@ -306,6 +313,9 @@ mod tests {
         let rpm = [M2006::FACTS, M3508::FACTS, Gm6020Voltage::FACTS, Gm6020Current::FACTS]
             .map(Facts::rotor_no_load_rpm);
         assert_eq!(rpm, [18_000, 9_256, 320, 320]); // 482 * 3591 / 187 = 9255.97
+        for facts in ALL_FACTS {
+            assert_eq!(facts.rotor_rpm, rotor_rpm(facts.no_load_rpm, facts.gear), "{}", facts.name);
+        }
     }
 
     proptest! {

@@ -398,6 +398,24 @@ mod tests {
     }
 
     #[test]
+    fn a_frame_that_found_no_place_goes_first_with_the_newest_words() {
+        let mut outbox = outbox(&[CommandFrame::X200, CommandFrame::X1FF]);
+        for frame in [CommandFrame::X200, CommandFrame::X1FF] {
+            outbox.put(Place::new(frame, 0), 1);
+        }
+        outbox.finish_update();
+        assert_eq!(outbox.next().map(|frame| frame.header()), Some(0x200));
+        assert!(outbox.put_back(0x200));
+        assert_eq!((ids(&mut outbox), outbox.superseded), (std::vec![0x200, 0x1FF], 0));
+        outbox.finish_update();
+        assert!(outbox.put_back(0x1FF), "an older one than the frame that waits");
+        assert_eq!((ids(&mut outbox), outbox.superseded), (std::vec![0x1FF, 0x200], 1));
+        assert!(!outbox.put_back(0x2FF), "not in use");
+        assert!(!outbox.put_back(0x8000_0200), "extended");
+        assert_eq!(outbox.next(), None);
+    }
+
+    #[test]
     fn where_only_some_frames_are_taken_in_each_update_all_have_their_turn() {
         let frames = [CommandFrame::X200, CommandFrame::X1FF, CommandFrame::X2FE];
         for (taken, refused) in [(1, 0), (2, 0), (1, 1), (2, 1)] {

@@ -451,6 +451,17 @@ mod tests {
     }
 
     #[test]
+    fn a_switch_is_at_one_position_and_at_none_without_a_signal() {
+        let positions = [Switch::Up, Switch::Middle, Switch::Down];
+        for switch in positions {
+            for position in positions {
+                assert_eq!(switch.is_at(position), Some(switch == position));
+            }
+        }
+        assert_eq!(positions.map(|position| Switch::Absent.is_at(position)), [None; 3]);
+    }
+
+    #[test]
     fn a_stick_in_the_middle_is_zero_with_no_sign() {
         assert_eq!(scaled(CENTRE, 0).map(f32::to_bits), Some(0.0_f32.to_bits()));
     }

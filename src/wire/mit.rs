@@ -38,21 +38,17 @@ use crate::units::{Angle, AngularVelocity};
 use impedance::Impedance;
 
 /// The data to enable a drive.
-pub const ENABLE: [u8; 8] = special(0xFC);
+pub const ENABLE: [u8; 8] = [0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFC];
 /// The data to disable a drive.
-pub const DISABLE: [u8; 8] = special(0xFD);
+pub const DISABLE: [u8; 8] = [0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFD];
 /// The data to make the present position zero.
-pub const SET_ZERO: [u8; 8] = special(0xFE);
+pub const SET_ZERO: [u8; 8] = [0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFE];
 
 /// The second half of the largest command below the special frames, which end with 0xFB to 0xFE.
 const HIGHEST_SECOND: u32 = 0xFFFF_FFFA;
 
 const TOP_16: u16 = 0xFFFF;
 const TOP_12: u16 = 0x0FFF;
-
-const fn special(last: u8) -> [u8; 8] {
-    [0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, last]
-}
 
 /// Measurements of the drive at the output shaft.
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
@@ -396,5 +392,17 @@ pub(crate) mod impedance {
             let [angle, velocity] = [angle.as_radians(), velocity.as_rad_per_s()];
             angle.to_bits() | velocity.to_bits() | stiffness.to_bits() | damping.to_bits() == 0
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_ranges_of_a_model_are_those_that_a_person_gives() {
+        let checked =
+            Ranges::new(12.5, 30.0, 10.0).and_then(|ranges| ranges.with_gains(400.0, 4.0));
+        assert_eq!(checked, Ok(Ranges::of([12.5, 30.0, 10.0], [400.0, 4.0])));
     }
 }

@@ -479,6 +479,24 @@ mod tests {
     }
 
     #[test]
+    fn a_parameter_has_the_name_and_the_range_that_it_was_given() {
+        assert_eq!(TABLE.map(|parameter| parameter.name()), ["kp", "ki", "speed"]);
+        assert_eq!(
+            TABLE.map(|parameter| parameter.range()),
+            [(0.0, 8.0), (0.0, 50.0), (-100.0, 100.0)]
+        );
+    }
+
+    #[test]
+    fn a_pause_between_two_lines_breaks_none() {
+        let mut parameters = parameters();
+        for at in [1_000, 2_000, 3_000] {
+            assert_eq!(hear(&mut parameters, "kp=1\n", ms(at)).len(), 1);
+        }
+        assert_eq!(parameters.counts(), Counts { frames: 3, ..Counts::default() });
+    }
+
+    #[test]
     fn a_line_for_each_parameter_says_value_range_and_unit() {
         let mut parameters = parameters();
         hear(&mut parameters, "speed=12.5\n", ms(0));
@@ -552,6 +570,7 @@ mod tests {
             ("1E-3", 1e-3),
             ("0000012", 12.0),
             ("16777217", 16_777_216.0),
+            ("10000000000000", 1e13),
         ] {
             let parsed = parse_number(text.as_bytes()).unwrap();
             assert_eq!(parsed.to_bits(), value.to_bits(), "{text}: {parsed}");
@@ -566,14 +585,19 @@ mod tests {
     fn text_that_is_no_number_is_none() {
         for text in [
             "", "-", ".", "1.2.3", "e5", "1e", "1e+", "1e1.5", "1,5", "0x10", "1_000", "--1",
-            "1 2", "infinity", "1e9999",
+            "1 2", "1:", "1/", "infinity", "1e9999",
         ] {
             assert_eq!(parse_number(text.as_bytes()), None, "{text}");
         }
         assert_eq!(parse_number(&[b'1'; 25]), None);
+        assert_eq!(parse_number(&[b'0'; 24]), Some(0.0));
         assert_eq!(
             (parse_index(b"12"), parse_index(b""), parse_index(b"1234"), parse_index(b"-1")),
             (Some(12), None, None, None)
+        );
+        assert_eq!(
+            (parse_index(b"907"), parse_index(b":"), parse_index(b"/")),
+            (Some(907), None, None)
         );
     }
 

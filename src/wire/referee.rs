@@ -360,6 +360,24 @@ mod tests {
     }
 
     #[test]
+    fn each_output_of_24_v_is_its_own_bit() {
+        for outputs in 0..=7 {
+            let data = [3, 1, 200, 0, 200, 0, 40, 0, 100, 0, 80, 0, outputs | 0xF8];
+            let Some(RefereeMessage::Robot {
+                gimbal_is_powered,
+                chassis_is_powered,
+                shooter_is_powered,
+                ..
+            }) = robot_state(Reader(&data))
+            else {
+                panic!("{outputs}: refused")
+            };
+            let powered = [gimbal_is_powered, chassis_is_powered, shooter_is_powered];
+            assert_eq!(powered, [1, 2, 4].map(|bit| outputs & bit != 0), "{outputs}");
+        }
+    }
+
+    #[test]
     fn data_too_long_for_the_length_field_is_refused() {
         let data = std::vec![0; 65_536];
         let error = encode(1, 0, &data, &mut []).unwrap_err();

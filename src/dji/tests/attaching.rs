@@ -67,8 +67,10 @@ fn a_parameter_that_is_not_usable_is_named() {
         let error = bus.attach(wheel.with_current_limit(Current::from_amperes(limit))).unwrap_err();
         assert_eq!(error.to_string(), "M3508 #1: command limit is not usable");
     }
-    let error = bus.attach(wheel.with_torque_constant(f32::NAN)).unwrap_err();
-    assert_eq!(error.to_string(), "M3508 #1: torque constant is not usable");
+    for nm_per_a in [0.0, -0.3, f32::NAN, f32::INFINITY] {
+        let error = bus.attach(wheel.with_torque_constant(nm_per_a)).unwrap_err();
+        assert_eq!(error.to_string(), "M3508 #1: torque constant is not usable");
+    }
     let yaw = Config::<Gm6020Voltage>::at_once(1).with_nominal_voltage(Voltage::from_volts(0.0));
     assert_eq!(
         bus.attach(yaw).unwrap_err().to_string(),

@@ -151,6 +151,30 @@ fn a_target_without_its_loop_is_an_error() {
 }
 
 #[test]
+fn a_target_is_renewed_by_a_handle_of_its_motor_alone_and_while_the_motor_is_heard() {
+    type Ask = fn(&mut Bus, Handle<M3508>) -> Result<(), TargetError>;
+    let asks: [Ask; 2] = [
+        |bus, wheel| bus.set_velocity(wheel, AngularVelocity::from_rad_per_s(5.0)),
+        |bus, wheel| bus.set_position(wheel, Position::from_turns(1)),
+    ];
+    for ask in asks {
+        let config = Config::<M3508>::at_once(1).position_loop(SPEED, SPEED);
+        let (mut bus, [old]) = armed([config]);
+        bus.detach(old);
+        let new = bus.attach(config).unwrap();
+        assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(2)), Ingest::Taken);
+        bus.arm(at_ms(2)).unwrap();
+        assert_eq!([ask(&mut bus, new), ask(&mut bus, new)], [Ok(()); 2]);
+        assert_eq!(ask(&mut bus, old), Err(TargetError::Detached));
+        for ms in 3..20 {
+            step(&mut bus, ms);
+        }
+        assert_eq!(bus.link(new), Some(Link::Late));
+        assert_eq!(ask(&mut bus, new), Err(TargetError::NoFeedback));
+    }
+}
+
+#[test]
 fn gains_change_while_running() {
     let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1).speed_loop(SPEED)]);
     bus.set_velocity(wheel, AngularVelocity::from_rad_per_s(4.0)).unwrap();

@@ -80,3 +80,15 @@ fn each_command_frame_in_use_tells_of_a_second_master_and_no_other_does() {
         assert_eq!(heard, expected, "0x{used:X} in use");
     }
 }
+
+#[test]
+fn a_device_that_is_disarmed_takes_no_target() {
+    fn disarm<D: Devices>(device: &mut D) {
+        device.disarm();
+        assert!(!device.is_armed());
+    }
+    let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1)]);
+    assert_eq!(bus.set_raw(wheel, 1), Ok(()));
+    disarm(&mut bus);
+    assert_eq!(bus.set_raw(wheel, 1), Err(TargetError::Disarmed));
+}

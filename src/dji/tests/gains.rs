@@ -59,6 +59,8 @@ fn a_gain_with_which_one_count_of_the_encoder_asks_for_the_no_load_speed_is_refu
     assert_eq!(bus.set_position_loop(arm, p(1.263e6)), Ok(()));
     let yaw = |kp| Config::<Gm6020Voltage>::new(5).position_loop(p(kp), SPEED);
     assert!(bus.attach(yaw(43_700.0)).is_err());
+    let steepest = bus.attach(yaw(320.0 / 60.0 * 8_192.0)).unwrap();
+    bus.detach(steepest);
     assert!(bus.attach(yaw(43_680.0)).is_ok());
 }
 

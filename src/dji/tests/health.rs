@@ -1,7 +1,8 @@
 //! Conditions of the motors of a bus: begin, end, and consequences.
 
+use super::watching::{Bench, CALM, SOUND, Told};
 use super::*;
-use crate::motor::{Condition, Conditions, MotorName};
+use crate::motor::{Condition, Conditions, HealthConfig, MotorName};
 use crate::time::Edge;
 
 fn hear(bus: &mut Bus, id: u16, ms: u64) {
@@ -136,4 +137,20 @@ fn a_motor_that_comes_while_all_is_quiet_is_watched_from_its_first_frame() {
         step(&mut bus, ms);
     }
     assert_eq!(bus.link(wheel), Some(Link::Offline));
+}
+
+/// The time of a runaway runs against half of the command on, also where a stall is looked for below.
+#[test]
+fn the_time_against_less_than_half_of_the_command_is_no_part_of_a_runaway() {
+    static WEAK: HealthConfig =
+        HealthConfig::new().with_stall(0.3, 0.02, Duration::from_millis(200));
+    for (weaker, expected) in [(-6_553, SOUND), (-9_830, SOUND.with(Condition::Runaway))] {
+        let mut bench = Bench::new(Config::<M3508>::at_once(1).with_health(&WEAK));
+        bench.run(50, CALM, 0);
+        for ms in 0..220 {
+            let raw = if ms < 170 { weaker } else { -9_830 };
+            bench.tick(Told { rpm: 200 + 15 * ms, ..CALM }, raw);
+        }
+        assert_eq!(bench.bus.conditions(bench.motor), expected, "{weaker}");
+    }
 }

@@ -46,16 +46,19 @@ fn outputs_are_cut_by_one_factor_and_the_others_and_the_next_update_know_nothing
 #[test]
 fn the_speed_loop_of_a_motor_that_is_cut_does_not_wind_up() {
     let loops = PidConfig::new(0.0, 100.0, 0.0);
-    let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1).speed_loop(loops)]);
-    for ms in 2..=502 {
-        assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(ms)), Ingest::Taken);
-        VelocityDrive::set_velocity(&mut bus, wheel, AngularVelocity::from_rad_per_s(1.0)).unwrap();
-        step(&mut bus, ms);
-        if ms < 502 {
-            bus.scale_outputs([wheel], 0.1);
+    for rad_per_s in [1.0, -1.0] {
+        let target = AngularVelocity::from_rad_per_s(rad_per_s);
+        let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1).speed_loop(loops)]);
+        for ms in 2..=502 {
+            assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(ms)), Ingest::Taken);
+            VelocityDrive::set_velocity(&mut bus, wheel, target).unwrap();
+            step(&mut bus, ms);
+            if ms < 502 {
+                bus.scale_outputs([wheel], 0.1);
+            }
         }
+        // 0.1 A a tick: with what was cut to a tenth each time, and no more than that.
+        let left = amperes(&bus, wheel) * rad_per_s;
+        assert!((0.1..0.12).contains(&left), "{left} A at {rad_per_s} rad/s");
     }
-    // 0.1 A a tick: with what was cut to a tenth each time, and no more than that.
-    let left = amperes(&bus, wheel);
-    assert!((0.1..0.12).contains(&left), "{left} A");
 }

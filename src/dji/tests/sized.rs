@@ -75,6 +75,28 @@ fn run<const N: usize>(mut bus: Bus<(), N>, ids: &[u8], heard: &[u8]) -> Vec<std
     seen
 }
 
+/// A round has a turn for each id of the protocol, and one to begin it.
+#[test]
+fn a_motor_is_looked_at_in_each_twelfth_update_however_small_the_bus_is() {
+    fn looks<const N: usize>() -> u16 {
+        let mut bus: Bus<(), N> = Bus::sized();
+        let wheel = bus.attach(Config::<M3508>::at_once(1)).unwrap();
+        for ms in 1..=120 {
+            let angle = u16::try_from(273 * ms % 8_192).unwrap();
+            assert_eq!(bus.ingest(&feedback(0x201, angle, 2_000), at_ms(ms)), Ingest::Taken);
+            if ms == 1 {
+                bus.arm(at_ms(ms)).unwrap();
+            }
+            bus.set_raw(wheel, 16_384).unwrap();
+            bus.update(Tick::new(at_ms(ms), 0.001));
+        }
+        bus.health(wheel).unwrap().saturated
+    }
+    for looks in [looks::<1>(), looks::<3>(), looks::<10>(), looks::<11>()] {
+        assert!((9..=11).contains(&looks), "{looks}");
+    }
+}
+
 proptest! {
     /// Law: a bus with room for as many motors as it has does what one with room for all does.
     #[test]

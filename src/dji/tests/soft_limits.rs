@@ -116,3 +116,25 @@ fn a_position_beyond_a_limit_is_taken_to_it() {
         assert!((volts - way).abs() < 2e-3, "{volts} V, {way} rad to {target:?}");
     }
 }
+
+/// P of 1 rad/s a radian, and 1 V per rad/s: 0.6 rad inwards, with half of the ramp.
+#[test]
+fn a_shaft_beyond_a_limit_is_led_back_while_the_range_opens() {
+    for (counts, target, way) in [(2_738, 1.5, -0.6), (391, 0.9, 0.6)] {
+        let ramp = config().with_opening(Duration::from_millis(1_000));
+        let mut bench = Bench::new(ramp.position_loop(SPEED, SPEED));
+        bench.angle = counts;
+        let mut volts = 0.0;
+        while bench.ms < 501 {
+            bench.ms += 1;
+            bench.hear(STILL);
+            let target = Position::from_angle(Angle::from_radians(target));
+            bench.bus.set_position(bench.motor, target).unwrap();
+            step(&mut bench.bus, bench.ms);
+            volts = sent(&mut bench.bus).last().map_or(0.0, |(_, words)| f32::from(words[0]))
+                * 24.0
+                / 25_000.0;
+        }
+        assert!((volts - 0.5 * way).abs() < 0.015, "{volts} V, {way} rad to {target}");
+    }
+}

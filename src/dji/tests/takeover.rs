@@ -149,6 +149,27 @@ fn a_motor_that_is_warm_keeps_to_its_share_in_a_position_loop_too() {
     }
 }
 
+/// 1 rad to go, at 1 rad/s a radian and 1 A per rad/s: far below the open share of the output.
+#[test]
+fn a_position_loop_goes_at_the_open_share_of_its_velocity() {
+    let gain = PidConfig::new(1.0, 0.0, 0.0);
+    let opening = Duration::from_millis(1_000);
+    let mut bench =
+        Bench::new(Config::<M3508>::new(1).with_opening(opening).position_loop(gain, gain));
+    for ms in 2..1_100_u16 {
+        bench.ms += 1;
+        bench.hear(STILL);
+        let ahead = Position::from_angle(Angle::from_radians(1.0));
+        bench.bus.set_position(bench.motor, ahead).unwrap();
+        step(&mut bench.bus, bench.ms);
+        let word = sent(&mut bench.bus).last().map_or(0, |(_, words)| words[0]);
+        // The range opens further at each look.
+        let share = |ms: u16| (f32::from(ms) / 1_000.0).min(1.0) * 16_384.0 / 20.0;
+        let expected = share(ms.saturating_sub(15)) - 1.0..=share(ms + 1) + 1.0;
+        assert!(expected.contains(&f32::from(word)), "{ms} ms: {word} of {expected:?}");
+    }
+}
+
 #[test]
 fn a_position_loop_does_not_go_on_from_a_velocity_before_a_rest() {
     let mut bench = yaw();

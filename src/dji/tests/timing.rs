@@ -1,3 +1,4 @@
+use super::watching::{Bench, CALM};
 use super::*;
 
 #[test]
@@ -64,5 +65,18 @@ fn a_ramp_rises_for_as_long_as_it_is_to_whatever_the_clock_shows() {
             let in_time = full_after.map(|ms| (100..=114).contains(&ms));
             assert_eq!(in_time, (expected_ms == 100).then_some(true), "{full_after:?}");
         }
+    }
+}
+
+#[test]
+fn the_ramp_of_a_motor_that_turns_and_with_which_nothing_is_wrong_rises_from_its_arming_on() {
+    let opening = Duration::from_millis(200);
+    let mut bench = Bench::new(Config::<M3508>::new(1).with_opening(opening));
+    for ms in 1..250_u16 {
+        let word = bench.tick(CALM, 16_384);
+        // The range opens further at each look.
+        let share = |ms: u16| (f32::from(ms) / 200.0).min(1.0) * 16_384.0;
+        let expected = share(ms.saturating_sub(14)) - 1.0..=share(ms + 2) + 1.0;
+        assert!(expected.contains(&f32::from(word)), "{ms} ms: {word} of {expected:?}");
     }
 }
