@@ -1,8 +1,11 @@
 //! Joints between soft limits, with a drive of each family in each of its modes.
 
+use crate::drives::Damiao;
 use crate::joint::stations;
 use crate::station::Station;
-use drivetrain::motor::{Capability, Condition, HealthConfig};
+use drivetrain::damiao::{Model, Motor};
+use drivetrain::motor::{Capability, Condition, HealthConfig, ImpedanceControl};
+use drivetrain::sim::{DamiaoDrive, DriveShaft};
 use drivetrain::units::Angle;
 
 static NARROW: HealthConfig =
@@ -258,6 +261,28 @@ fn a_velocity_leads_a_joint_far_outside_back_without_a_throw() {
         }
         let case = format!("{}: {furthest} rad, {fastest} rad/s, {jump} Nm", joint.name);
         assert!(furthest < 2.25 && fastest < 0.8 && jump < 0.3, "{case}");
+    }
+}
+
+/// The arm of `docs/gains.md`, whose weight stretches its soft spring by 0.22 rad.
+#[test]
+fn a_velocity_leads_an_arm_back_whose_weight_stretches_its_spring_far() {
+    let arm = || {
+        let gains = ImpedanceControl::new(9.0).unwrap().with_gains(6.75, 0.9).unwrap();
+        let drive = DamiaoDrive::of(Model::J4340, 1).with_shaft(DriveShaft::new(0.03, 0.01));
+        let motor = Motor::new(Model::J4340, 1, gains).unwrap();
+        Station::new(motor, |own, share| own.set_torque(share), Damiao(drive, true))
+    };
+    for (is_reversed, sign) in [(false, 1.0), (true, -1.0)] {
+        let station = at(arm, &NARROW, is_reversed, 2.2);
+        let mut joint = Pushed { name: String::new(), station, sign };
+        joint.run(0.0, 300, Pushed::angle);
+        joint.load(1.47);
+        let (_, furthest) = joint.run(0.0, 1_000, Pushed::angle);
+        assert!((joint.angle() - 2.42).abs() < 0.01 && furthest < 2.5, "{furthest} rad");
+        let (fastest, _) = joint.run(2.0, 5_000, Pushed::velocity);
+        assert!((joint.angle() - 1.22).abs() < 0.01, "{} rad", joint.angle());
+        assert!(fastest > -0.6, "{fastest} rad/s");
     }
 }
 

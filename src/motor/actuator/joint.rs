@@ -192,6 +192,8 @@ const SLOW: f32 = 4.0;
 const BACK: f32 = 0.5;
 /// An angle leads so much further than a load has stretched the spring, in rad: a blocked shaft turns no further at once when freed.
 const AHEAD: f32 = 0.1;
+/// A shaft that is pushed outward moves more than this, in rad: more than its feedback is off.
+const PUSH: f32 = 0.025;
 /// The way to a limit in rad over which an outward torque falls to zero.
 const FADING: f32 = 0.02;
 /// The longest way in rad to an angle, so that the shortest way leads in the same direction.
@@ -292,13 +294,14 @@ pub(super) struct Start {
     pub(super) lead: Option<Lead>,
 }
 
-/// The angle in the place of a velocity at a soft limit and beyond: so far inward in rad from where the shaft was first. A load has pushed
-/// the shaft outward since, so far.
+/// The angle in the place of a velocity at a soft limit and beyond: so far inward in rad from where the shaft was first.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lead {
     angle: Angle,
     inward: f32,
-    pushed: f32,
+    /// A load pushes a shaft that is further outward than this, and has stretched the spring so far, in rad.
+    outmost: f32,
+    stretch: f32,
 }
 
 impl Start {
@@ -343,14 +346,18 @@ impl Start {
         if wanted > BACK {
             return None;
         }
-        let begin = Lead { angle: Angle::from_radians(here), inward: 0.0, pushed: 0.0 };
-        let Lead { angle, inward, pushed } = before.unwrap_or(begin);
+        let angle = Angle::from_radians(here);
+        let begin = Lead { angle, inward: 0.0, outmost: PUSH, stretch: 0.0 };
+        let Lead { angle, inward, mut outmost, mut stretch } = before.unwrap_or(begin);
         let out = side * (here - angle.as_radians());
-        let pushed = pushed.max(out);
+        if out > outmost {
+            (outmost, stretch) = (out, stretch.max(out + inward));
+        }
+        let outmost = outmost.min(out + PUSH);
         // An inward velocity leads past the limit, an outward one to it.
         let end = if wanted > 0.0 { f32::MAX } else { side * (angle.as_radians() - limit) };
-        let inward = (inward + way).min(end).min(pushed + AHEAD - out).max(inward);
-        self.lead = Some(Lead { angle, inward, pushed });
+        let inward = (inward + way).min(end).min(stretch + AHEAD - out).max(inward);
+        self.lead = Some(Lead { angle, inward, outmost, stretch });
         Some(angle - Angle::from_radians(side * inward))
     }
 
@@ -501,12 +508,13 @@ mod tests {
             for (step, (here, wanted, expected)) in [
                 (2.5, 3.0, Some(2.45)),
                 (2.45, 0.0, Some(2.45)),
-                (2.5, 0.2, Some(2.43)), // a load pushed the shaft by 0, and no further than from 2.5
-                (2.9, 9.0, Some(2.4)),  // by 0.4
-                (2.9, 9.0, Some(2.4)),  // 0.5 rad ahead
-                (2.85, 9.0, Some(2.35)),
-                (2.3, 9.0, Some(2.3)),
-                (2.3, -0.2, Some(2.28)),
+                (2.5, 0.2, Some(2.43)),
+                (2.9, 9.0, Some(2.38)), // pushed: the spring is stretched by 0.47 rad
+                (2.9, 9.0, Some(2.33)),
+                (2.9, 9.0, Some(2.33)), // 0.57 rad ahead
+                (2.8, 9.0, Some(2.28)),
+                (2.3, 9.0, Some(2.23)),
+                (2.3, -0.2, Some(2.21)),
                 (2.3, -0.6, None),
                 (2.3, 0.1, Some(2.29)), // anew
                 (2.0, 9.0, Some(2.24)),
