@@ -3,8 +3,8 @@
 use crate::drives::{raw, with_id};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    Actuator, AngleDrive, ArmError, BusLoad, CanDevice, Claim, Conditions, Devices, DriveProtocol,
-    HealthConfig, Ingest, Link, TargetError, VelocityDrive,
+    Actuator, AngleDrive, ArmError, BusLoad, CanDevice, Capabilities, Claim, Conditions, Devices,
+    DriveProtocol, HealthConfig, Ingest, Link, TargetError, VelocityDrive,
 };
 use drivetrain::sim::DriveShaft;
 use drivetrain::time::{Instant, Tick};
@@ -23,6 +23,8 @@ pub(crate) trait Device {
     fn is_armed(&mut self) -> bool;
     /// Sets a share of the target that the test of a mode drives to.
     fn set(&mut self, share: f32) -> Result<(), TargetError>;
+    fn set_velocity(&mut self, rad_per_s: f32) -> Result<(), TargetError>;
+    fn capabilities(&self) -> Capabilities;
     /// Turns the positive direction round.
     fn reverse(&mut self);
     fn set_present_angle(&mut self, angle_rad: f32) -> Result<(), TargetError>;
@@ -73,6 +75,12 @@ impl<M: DriveProtocol + Copy> Device for Driven<M> {
     }
     fn set(&mut self, share: f32) -> Result<(), TargetError> {
         (self.1)(&mut self.0, share)
+    }
+    fn set_velocity(&mut self, rad_per_s: f32) -> Result<(), TargetError> {
+        self.0.set_velocity((), AngularVelocity::from_rad_per_s(rad_per_s))
+    }
+    fn capabilities(&self) -> Capabilities {
+        VelocityDrive::capabilities(&self.0, ())
     }
     fn reverse(&mut self) {
         self.0 = self.0.reversed();

@@ -58,7 +58,8 @@ impl ImpedanceControl {
         }
     }
 
-    /// Has the drive itself follow velocities with a damping in Nm s/rad, and angles with a stiffness in Nm/rad beside it.
+    /// Has the drive itself follow velocities with a damping in Nm s/rad, and angles with a stiffness in Nm/rad beside it;
+    /// no angles with a stiffness of 0.
     ///
     /// # Errors
     /// [`ConfigError::Negative`] for a value that is negative or not finite.
@@ -110,10 +111,11 @@ impl ImpedanceControl {
     #[must_use]
     pub fn capabilities(&self) -> Capabilities {
         let always = Capabilities::of(&[Capability::Torque, Capability::Impedance]);
-        if self.gains.is_none() && self.loops.is_none() {
-            return always;
+        match (self.gains, &self.loops) {
+            (None, None) => always,
+            (Some((stiffness, _)), None) if stiffness <= 0.0 => always.with(Capability::Velocity),
+            _ => always.with(Capability::Velocity).with(Capability::Angle),
         }
-        always.with(Capability::Velocity).with(Capability::Angle)
     }
 
     /// Returns the command to the drive; `None` to rest: an angle is needed and not known, or the target is not
@@ -438,6 +440,21 @@ mod tests {
             assert_eq!(step(&mut loops, between), None);
             assert_eq!(step(&mut loops, Target::Angle(Angle::ZERO)), Some(0.0), "{between:?}");
         }
+    }
+
+    #[test]
+    fn a_spring_without_stiffness_takes_no_angles() {
+        let control = ImpedanceControl::new(LIMIT_NM).unwrap();
+        let position = PidConfig::new(10.0, 0.0, 0.0);
+        let takes = |control: ImpedanceControl| {
+            let capabilities = control.capabilities();
+            [Capability::Velocity, Capability::Angle].map(|kind| capabilities.has(kind))
+        };
+        assert_eq!(takes(control), [false, false]);
+        let damper = control.with_gains(0.0, 1.0).unwrap();
+        assert_eq!(takes(damper), [true, false]);
+        assert_eq!(takes(damper.with_loops(position, position).unwrap()), [true, true]);
+        assert_eq!(takes(control.with_gains(20.0, 1.0).unwrap()), [true, true]);
     }
 
     #[test]

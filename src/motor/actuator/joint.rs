@@ -1,5 +1,6 @@
 //! The joint on the shaft of the drive: targets and measurements in its own direction, from its own zero.
 
+use super::power::Reading;
 use super::{Impedance, Shaft, Target};
 use crate::control::limited;
 use crate::math::wrap_pi;
@@ -7,33 +8,8 @@ use crate::motor::{Condition, Latch, TargetError, check_soft_limits};
 use crate::units::{Angle, AngularVelocity};
 use core::f32::consts::TAU;
 
-/// A reading of the angle, with the stamp of its feedback.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Reading {
-    pub(super) angle: Angle,
-    pub(super) velocity: AngularVelocity,
-    pub(super) at: u32,
-}
-
-/// Feedback may have waited in a buffer for so long, in s.
-const WAITED_S: f32 = 0.04;
 /// After a longer time of feedback without an angle, in s, whole turns are not known.
 const UNKNOWN_S: f32 = 0.1;
-
-impl Reading {
-    /// Returns the largest way in rad of the shaft to a later reading: at the larger of both velocities, for a little longer than the time
-    /// between them, and beside that 0.25 rad, and 8 rad/s for a shaft that sped up and stopped meanwhile.
-    fn furthest(&self, later: &Self, gap_s: f32) -> f32 {
-        let (one, other) = (self.velocity.as_rad_per_s(), later.velocity.as_rad_per_s());
-        // A velocity that is no number counts as none.
-        let fastest = one.abs().max(other.abs()).max(0.0);
-        0.25 + 8.0 * gap_s + 1.5 * fastest * gap_s.max(WAITED_S)
-    }
-
-    fn gap_s(&self, later: &Self) -> f32 {
-        later.at.wrapping_sub(self.at) as f32 * 1e-6
-    }
-}
 
 /// The direction and the zero of the joint: its angle is `sign * (angle of the drive - zero)`.
 #[derive(Debug, Clone, Copy)]
@@ -214,6 +190,10 @@ const BRAKING_S: f32 = 0.1;
 const SLOW: f32 = 4.0;
 /// An outward velocity beyond a limit leads back, at most so fast in rad/s.
 const BACK: f32 = 0.5;
+/// An angle leads so much further than a load has stretched the spring, in rad: a blocked shaft turns no further at once when freed.
+const AHEAD: f32 = 0.1;
+/// A shaft that is pushed outward moves more than this, in rad: more than its feedback is off.
+const PUSH: f32 = 0.025;
 /// The way to a limit in rad over which an outward torque falls to zero.
 const FADING: f32 = 0.02;
 /// The longest way in rad to an angle, so that the shortest way leads in the same direction.
@@ -310,26 +290,75 @@ impl Inside {
 pub(super) struct Start {
     angle: Option<Angle>,
     velocity: Option<AngularVelocity>,
+    /// Of a motor at rest none: the shaft may turn.
+    pub(super) lead: Option<Lead>,
+}
+
+/// The angle in the place of a velocity at a soft limit and beyond: so far inward in rad from where the shaft was first.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Lead {
+    angle: Angle,
+    inward: f32,
+    /// A load pushes a shaft that is further outward than this, and has stretched the spring so far, in rad.
+    outmost: f32,
+    stretch: f32,
 }
 
 impl Start {
-    pub(super) const NONE: Self = Self { angle: None, velocity: None };
+    pub(super) const NONE: Self = Self { angle: None, velocity: None, lead: None };
 
     /// The drive counts so many turns further.
     pub(super) fn turn(&mut self, turns: Angle) {
         self.angle = self.angle.map(|angle| angle + turns);
+        if let Some(Lead { angle, .. }) = &mut self.lead {
+            *angle = *angle + turns;
+        }
     }
 
-    /// Returns the target on its way from the start, as far as the output range is open; within the limits, if any.
+    /// Returns the target on its way from the start, as far as the output range is open; within the limits, if any. The step is `None` in a
+    /// mode without angles.
     pub(super) fn goal(
         &mut self,
         target: Target,
         opened: f32,
         shaft: Shaft,
         inside: Option<Inside>,
+        dt_s: Option<f32>,
     ) -> Target {
+        let led = self.lead(target, inside, dt_s);
         let Some(inside) = inside else { return self.open(target, opened, shaft, false) };
-        inside.next(self.open(inside.target(target), opened, shaft, true))
+        inside.next(match led {
+            Some(angle) => Target::Angle(angle),
+            None => self.open(inside.target(target), opened, shaft, true),
+        })
+    }
+
+    /// Returns the angle in the place of a velocity, where a damper would give way to a load: the angle moves inward alone. `None` between
+    /// the limits, and for a fast inward velocity.
+    fn lead(&mut self, target: Target, inside: Option<Inside>, dt_s: Option<f32>) -> Option<Angle> {
+        let (before, Inside { lower, upper, here, .. }) = (self.lead.take(), inside?);
+        let (limit, side) = if here >= upper { (upper, 1.0) } else { (lower, -1.0) };
+        let (Target::Velocity(velocity), true) = (target, side * (here - limit) >= 0.0) else {
+            return None;
+        };
+        let wanted = -side * velocity.as_rad_per_s();
+        let way = wanted.abs().min(BACK) * dt_s?;
+        if wanted > BACK {
+            return None;
+        }
+        let angle = Angle::from_radians(here);
+        let begin = Lead { angle, inward: 0.0, outmost: PUSH, stretch: 0.0 };
+        let Lead { angle, inward, mut outmost, mut stretch } = before.unwrap_or(begin);
+        let out = side * (here - angle.as_radians());
+        if out > outmost {
+            (outmost, stretch) = (out, stretch.max(out + inward));
+        }
+        let outmost = outmost.min(out + PUSH);
+        // An inward velocity leads past the limit, an outward one to it.
+        let end = if wanted > 0.0 { f32::MAX } else { side * (angle.as_radians() - limit) };
+        let inward = (inward + way).min(end).min(stretch + AHEAD - out).max(inward);
+        self.lead = Some(Lead { angle, inward, outmost, stretch });
+        Some(angle - Angle::from_radians(side * inward))
     }
 
     /// Returns the target on its way. The way to an angle is the shortest one, unless it is to be `direct`.
@@ -417,8 +446,8 @@ mod tests {
             (1.0, 9.0, 5.0, 10.0),
         ] {
             let shaft = (Some(Angle::from_radians(here)), velocity(2.0 * here));
-            assert_eq!(start.goal(spring(5.0), opened, shaft, None), spring(angle));
-            let goal = start.goal(Target::Velocity(velocity(10.0)), opened, shaft, None);
+            assert_eq!(start.goal(spring(5.0), opened, shaft, None, None), spring(angle));
+            let goal = start.goal(Target::Velocity(velocity(10.0)), opened, shaft, None, None);
             assert_eq!(goal, Target::Velocity(velocity(speed)));
         }
     }
@@ -466,6 +495,78 @@ mod tests {
             let target = Target::Velocity(AngularVelocity::from_rad_per_s(wanted));
             let Target::Velocity(sent) = inside(here, 0.0).target(target) else { panic!() };
             assert!((sent.as_rad_per_s() - expected).abs() < 1e-4, "{here}, {wanted}: {sent:?}");
+        }
+    }
+
+    /// Each step is 0.1 s. The place of the shaft, the target, and the angle in its place; `None` for a velocity.
+    #[test]
+    fn a_velocity_beyond_a_limit_is_an_angle_that_moves_inward_alone() {
+        for (is_upper, turns) in [(true, 0.0), (false, 0.0), (true, TAU), (false, -TAU)] {
+            // Of the limits -1 and 2 rad: mirrored, and moved on halfway.
+            let place = |angle: f32, turns| turns + if is_upper { angle } else { 1.0 - angle };
+            let mut start = Start::NONE;
+            for (step, (here, wanted, expected)) in [
+                (2.5, 3.0, Some(2.45)),
+                (2.45, 0.0, Some(2.45)),
+                (2.5, 0.2, Some(2.43)),
+                (2.9, 9.0, Some(2.38)), // pushed: the spring is stretched by 0.47 rad
+                (2.9, 9.0, Some(2.33)),
+                (2.9, 9.0, Some(2.33)), // 0.57 rad ahead
+                (2.8, 9.0, Some(2.28)),
+                (2.3, 9.0, Some(2.23)),
+                (2.3, -0.2, Some(2.21)),
+                (2.3, -0.6, None),
+                (2.3, 0.1, Some(2.29)), // anew
+                (2.0, 9.0, Some(2.24)),
+                (1.99, 9.0, None),
+                (2.0, 9.0, Some(2.0)),
+                (2.0, 9.0, Some(2.0)),
+                (2.0, -0.5, Some(1.95)),
+                (2.0, -0.5, Some(1.9)),
+                (2.0, -0.5, Some(1.9)), // 0.1 rad ahead
+            ]
+            .into_iter()
+            .enumerate()
+            {
+                let turns = if step < 6 { 0.0 } else { turns };
+                if step == 6 {
+                    start.turn(Angle::from_radians(turns));
+                }
+                let inside = Inside {
+                    lower: -1.0 + turns,
+                    upper: 2.0 + turns,
+                    here: place(here, turns),
+                    velocity: 0.0,
+                };
+                let wanted =
+                    AngularVelocity::from_rad_per_s(if is_upper { wanted } else { -wanted });
+                let target = Target::Velocity(wanted);
+                let shaft = (Some(Angle::from_radians(inside.here)), AngularVelocity::ZERO);
+                // The way is that of an open output from the beginning.
+                let goal = start.goal(target, 0.5, shaft, Some(inside), Some(0.1));
+                match (goal, expected) {
+                    (Target::Angle(angle), Some(expected)) => {
+                        let off = angle.as_radians() - place(expected, turns);
+                        assert!(off.abs() < 1e-5, "{step}, {is_upper}: {angle:?}");
+                    }
+                    (Target::Velocity(_), None) => {}
+                    _ => panic!("{step}: {goal:?}"),
+                }
+            }
+            // Neither another kind of target nor a mode without angles nor a lost zero.
+            let outside = Some(inside(2.5, 0.0));
+            let shaft = (Some(Angle::from_radians(2.5)), AngularVelocity::ZERO);
+            let velocity = Target::Velocity(AngularVelocity::from_rad_per_s(1.0));
+            for (target, inside, dt_s) in [
+                (Target::Torque(1.0), outside, Some(0.1)),
+                (velocity, outside, None),
+                (velocity, None, Some(0.1)),
+            ] {
+                start.goal(velocity, 1.0, shaft, outside, Some(0.1));
+                assert!(start.lead.is_some());
+                let goal = start.goal(target, 1.0, shaft, inside, dt_s);
+                assert!(start.lead.is_none() && !matches!(goal, Target::Angle(_)), "{goal:?}");
+            }
         }
     }
 

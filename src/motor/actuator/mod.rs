@@ -223,6 +223,7 @@ impl<M: DriveProtocol> Actuator<M> {
         // From now on each frame is compared with the one before.
         self.guard.trust(0);
         self.guard.note(Condition::PositionUncertain, false, self.guard.device.updated());
+        self.start.lead = None;
         if self.shaft().1.is_some_and(|inside| inside.is_outside()) {
             self.reopen();
         }

@@ -1,9 +1,10 @@
 //! The reaction of a motor to a frame of its drive, and its update.
 
-use super::joint::{Inside, Reading, Start};
+use super::joint::{Inside, Start};
+use super::power::Reading;
 use super::{Actuator, DriveProtocol, INQUIRY, Offered, SILENCE_US};
 use crate::frame::CanFrame;
-use crate::motor::{Condition, Ingest, Link, Repeat, Route, Vitals};
+use crate::motor::{Capability, Condition, Ingest, Link, Repeat, Route, Vitals};
 use crate::time::{Instant, TimeStep};
 use crate::units::Angle;
 use embedded_can::Frame;
@@ -131,7 +132,7 @@ impl<M: DriveProtocol> Actuator<M> {
         if drives && !step.is_hold() && self.was_online && self.has_nothing_due() {
             self.power.pass(now);
             self.has_posted = false;
-            self.follow(left);
+            self.follow(left, step);
             return true;
         }
         let may_drive = drives && self.offered.may_repeat.admits(step.is_hold());
@@ -148,7 +149,7 @@ impl<M: DriveProtocol> Actuator<M> {
         let inquiry = self.inquire(now);
         let is_at_rest = !may_drive || !self.power.is_ready();
         if !is_at_rest && !step.is_hold() {
-            self.follow(left);
+            self.follow(left, step);
             return true;
         }
         let command = self.act(may_drive);
@@ -169,13 +170,13 @@ impl<M: DriveProtocol> Actuator<M> {
     }
 
     /// Finds what the drive is told of the target, and the share of the output, of which the conditions leave so much.
-    fn follow(&mut self, left: f32) {
+    fn follow(&mut self, left: f32, step: TimeStep) {
         self.is_resting = false;
         let opened = self.guard.share();
         self.is_narrowed = opened < 1.0 || self.watch.soft_limits().is_some();
         if self.is_narrowed {
             self.share = if left < opened { left } else { opened };
-            self.narrow(opened);
+            self.narrow(opened, step);
             return;
         }
         self.share = left;
@@ -186,9 +187,10 @@ impl<M: DriveProtocol> Actuator<M> {
 
     /// Finds the goal on the way from the start, as far as the output range is open, and within the soft limits.
     #[inline(never)]
-    fn narrow(&mut self, opened: f32) {
+    fn narrow(&mut self, opened: f32, step: TimeStep) {
         let (shaft, inside) = self.shaft();
-        self.goal = self.start.goal(self.target, opened, shaft, inside);
+        let dt_s = self.motor.capabilities().has(Capability::Angle).then_some(step.dt_s());
+        self.goal = self.start.goal(self.target, opened, shaft, inside, dt_s);
     }
 
     /// Checks the health of the motor and takes the reactions, which may relax the motor; returns the share of the output left.
@@ -294,6 +296,7 @@ impl<M: DriveProtocol> Actuator<M> {
     /// for feedback.
     fn act(&mut self, may_drive: bool) -> Option<CanFrame> {
         if !may_drive || !self.power.is_ready() {
+            self.start.lead = None;
             // A late motor keeps its integral, one without a target starts afresh.
             if !self.guard.has_target() {
                 self.relax();

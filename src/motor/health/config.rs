@@ -123,15 +123,21 @@ impl HealthConfig {
     /// Outside, the motor is driven inward only, also if the shaft starts there; at speed, already a little before. No effect while the
     /// absolute position is unknown: for a geared motor, until the position is set. A motor without CAN refuses soft limits.
     ///
-    /// An [`Actuator`](crate::motor::Actuator) changes each kind of target, and has the edge from 0.02 rad before a limit. An angle, or loops of this
-    /// crate, hold a loaded joint at its limit; a damper and a torque do not:
+    /// An [`Actuator`](crate::motor::Actuator) changes each kind of target, and has the edge from 0.02 rad before a limit. A mode that takes
+    /// angles, loops of this crate and a stiffness hold a loaded joint at its limit; a damper alone and a torque do not:
     ///
     /// * An angle is reached by the shortest way that stays inside; an angle outside is the limit next to it.
-    /// * An outward velocity is at most the distance to the limit divided by 0.1 s. Beyond the limit it leads back in the same way, no faster
-    ///   than 0.5 rad/s and than the target: a damper, of gains or of an impedance, holds a load of up to its damping times this velocity, and a
-    ///   larger load pulls the joint on. A velocity of zero stays zero: any load, or a drive whose command has no exact zero, moves the joint on, a
-    ///   J4310 by 0.01 rad/s.
-    /// * The angle of an impedance is limited, and its velocity and torque as above.
+    /// * An outward velocity is at most the distance to the limit divided by 0.1 s. At the limit and beyond, a mode with
+    ///   [`Capability::Angle`](crate::motor::Capability::Angle) follows an angle in its place: from where the shaft was found, the angle moves to the
+    ///   limit, no faster than 0.5 rad/s and than the target, and never outward. A velocity of zero holds the angle, and an inward one of up to
+    ///   0.5 rad/s leads the angle past the limit. A load stretches the spring of a drive by the load divided by the stiffness; the angle leads
+    ///   by at most 0.1 rad more than a load has pushed the shaft, so a blocked shaft turns no further at once when it is freed, and a joint that
+    ///   lies on a stop needs a stiffness of ten times its load to leave the stop. A faster inward velocity is sent as it is: its damper pulls alone against
+    ///   the load.
+    /// * A mode without angles is led back by a velocity, no faster than 0.5 rad/s and than the target. There a velocity of zero stays zero.
+    /// * The angle of an impedance is limited, its velocity as in a mode without angles, and its torque as below: the stiffness holds the load, and
+    ///   a damper without stiffness holds up to its damping times 0.5 rad/s. A larger load pulls the joint on, and so does any load on a
+    ///   damper with a velocity of zero.
     /// * An outward torque falls to zero over the last 0.02 rad, and from half of that velocity on; at a higher velocity it brakes, with at most
     ///   as much torque as the target has. So a small target stops a fast joint late, and a torque of zero never does; neither holds a load.
     /// * Where the drive has no angle, beyond the range of its feedback, the motor rests, armed and without an edge.
