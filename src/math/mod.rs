@@ -263,16 +263,17 @@ pub const fn wrap(x: f32, period: f32) -> f32 {
     if turns.abs() <= exact_turns && rest.abs() < 0.5 * period { rest } else { far(x, period) }
 }
 
-/// Returns the value of [`wrap`], to within the spacing of `f32` at `x`, in fewer instructions and without a call.
+/// Returns the value of [`wrap`] for a period of twice `half`, to within the spacing of `f32` at `x`, in fewer instructions and without a
+/// call.
 ///
 /// Beyond 4 million periods, where `x` holds no remainder any more, the value is any within half a period; for NaN and infinity
 /// the value is zero.
 #[inline]
-pub(crate) const fn shortest(x: f32, period: f32) -> f32 {
-    let half = 0.5 * period;
+pub(crate) const fn shortest(x: f32, half: f32) -> f32 {
     if x.abs() < half {
         return x;
     }
+    let period = half + half;
     let turns = (x / period + ROUND) - ROUND;
     let rest = x - turns * period;
     if rest.abs() < half {

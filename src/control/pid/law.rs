@@ -52,7 +52,8 @@ impl ErrorPid {
         let mut growth = p.ki * step.half_dt_s * (error + self.error);
         if size > p.full_rate_below {
             let weight = (p.no_rate_above - size) / (p.no_rate_above - p.full_rate_below);
-            growth *= if weight > 0.0 { weight } else { 0.0 };
+            // Below zero the bits are negative too.
+            growth *= f32::from_bits(weight.to_bits().cast_signed().max(0).cast_unsigned());
         }
         if size < p.dead_band {
             proportional = 0.0;
@@ -110,10 +111,8 @@ impl ErrorPid {
 
     /// Ends a step, and returns its output.
     const fn keep(&mut self, output: f32, error: f32, rate: f32, integral: f32) -> f32 {
-        self.output = output;
-        self.error = error;
-        self.rate = rate;
-        self.integral = integral;
+        (self.output, self.error) = (output, error);
+        (self.rate, self.integral) = (rate, integral);
         output
     }
 }
@@ -197,18 +196,22 @@ impl Pid {
     #[inline(never)]
     fn full(&mut self, valid: f32, measured: f32, error: f32, rate: f32, step: &TimeStep) -> f32 {
         let (mut error, mut rate) = (error, rate);
-        let mut rests = self.core.options & REST_DERIVATIVE != 0;
         // Bad arguments, an unknown measurement, a step that is not normal, overflow.
         if !(error + rate).is_finite() {
             if step.is_hold() || !valid.is_finite() || !measured.is_finite() {
                 return self.refuse(!step.is_hold());
             }
-            rests |= self.measurement == UNKNOWN || step.is_frozen();
-            (error, rate) = (finite(error), finite(rate));
+            let rests = self.measurement == UNKNOWN || step.is_frozen();
+            self.core.options |= if rests { REST_DERIVATIVE } else { 0 };
+            // The rate of a circle that overflows is left to `bound`.
+            (error, rate) = (finite(error), if self.way > 0.0 { rate } else { finite(rate) });
         }
         if self.way > 0.0 {
             error = math::shortest(error, self.way);
-            rate = math::shortest(measured - self.measurement, self.way) * step.per_dt;
+            let travel = measured - self.measurement;
+            if travel.abs() >= self.way {
+                rate = math::shortest(travel, self.way) * step.per_dt;
+            }
         } else if self.way < 0.0 {
             // The tracked setpoint moves on: the linear tracking differentiator by Euler's rule. The setpoint of the last step is
             // `measurement + error`, so only its rate has to be stored.
@@ -220,14 +223,14 @@ impl Pid {
             self.tracking_rate = finite(pace - dt_s * (r * pull));
             error = finite(last + dt_s * pace);
         }
-        if self.core.options & DERIVATIVE_ON_ERROR != 0 {
-            let way = self.core.error - error;
-            let way = if self.way > 0.0 { math::shortest(way, self.way) } else { way };
-            rate = way * step.per_dt;
-        }
-        if rests {
-            rate = self.core.rate;
-            self.core.set_options(self.core.options & !REST_DERIVATIVE);
+        if self.core.options & (DERIVATIVE_ON_ERROR | REST_DERIVATIVE) != 0 {
+            if self.core.options & REST_DERIVATIVE != 0 {
+                rate = self.core.rate;
+                self.core.set_options(self.core.options & !REST_DERIVATIVE);
+            } else {
+                let (way, half) = (self.core.error - error, self.way);
+                rate = step.per_dt * if half > 0.0 { math::shortest(way, half) } else { way };
+            }
         }
         self.measurement = measured;
         self.core.full(error, rate, self.feed_forward_of(measured + error), step)

@@ -84,7 +84,7 @@ pub struct Pid {
     measurement: f32,
     /// The part for errors that are formed elsewhere.
     pub(crate) core: ErrorPid,
-    /// The period; or the speed of tracking, negative.
+    /// Half of the period; or the speed of tracking, negative.
     way: f32,
     /// The rate of the tracked setpoint.
     tracking_rate: f32,
@@ -264,7 +264,7 @@ impl Pid {
             integral_limit: limit_of(self.core.integral_limit_gate()),
             static_gain: self.static_gain,
             velocity_gain: self.velocity_gain,
-            period: if self.way > 0.0 { self.way } else { 0.0 },
+            period: if self.way > 0.0 { self.way + self.way } else { 0.0 },
             tracking_r: if self.way < 0.0 { -self.way } else { 0.0 },
             derivative_on_error: self.core.options & DERIVATIVE_ON_ERROR != 0,
             incremental: self.core.options & INCREMENTAL != 0,
@@ -295,9 +295,8 @@ impl Pid {
 
     /// Stores a validated configuration.
     const fn store(&mut self, config: &PidConfig) {
-        self.way = config.period - config.tracking_r;
-        self.static_gain = config.static_gain;
-        self.velocity_gain = config.velocity_gain;
+        self.way = 0.5 * config.period - config.tracking_r;
+        (self.static_gain, self.velocity_gain) = (config.static_gain, config.velocity_gain);
         self.core.parameters = config.parameters;
         (self.core.integral_gate, self.core.output_gate) = (CLOSED, gate(config.integral_limit));
         let state = self.core.options & (REST_DERIVATIVE | TRACK_OUTPUT);
