@@ -20,7 +20,7 @@ use crate::units::AngularVelocity;
 impl Joints {
     /// Sets the position to go to, from the joint's zero. Saturates at the ±32768 turns of the joint's counter.
     ///
-    /// Costs 76 instructions on a Cortex-M4F (`docs/figures.md`).
+    /// Costs 79 instructions on a Cortex-M4F (`docs/figures.md`).
     ///
     /// # Errors
     /// Fails unless the joint is attached, armed and online, and for NaN and infinity.

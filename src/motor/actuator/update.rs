@@ -331,8 +331,8 @@ impl<M: DriveProtocol> Actuator<M> {
     }
 
     pub(super) fn relax(&mut self) {
-        self.start = Start::NONE;
         if !self.is_resting {
+            self.start = Start::NONE;
             self.motor.reset();
             self.is_resting = true;
         }
