@@ -177,7 +177,7 @@ impl Slot {
         goal: Goal::NONE,
         shaft: Shaft::new(GearRatio::DIRECT, false),
         feedback: Feedback::NONE,
-        guard: MotorGuard::NEW,
+        guard: MotorGuard::FREE,
         rad_per_s_per_rpm: 0.0,
         raw_per_unit: 0.0,
         nm_per_a: 0.0,

@@ -403,6 +403,16 @@ mod tests {
     }
 
     #[test]
+    fn a_target_ends_in_a_pause_before_the_first_update_too() {
+        for (pause, drives) in
+            [(Duration::from_millis(50), true), (Duration::from_micros(1 << 32), false)]
+        {
+            let mut guard = deaf();
+            assert_eq!(guard.drives(at_ms(51) + pause), drives, "{pause:?}");
+        }
+    }
+
+    #[test]
     fn a_range_that_begins_to_open_at_the_end_of_a_pause_is_not_open_at_once() {
         let mut guard = Guard::without_feedback();
         assert!(!guard.drives(at_ms(1)));

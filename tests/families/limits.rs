@@ -280,27 +280,29 @@ fn a_velocity_leads_an_arm_back_whose_weight_stretches_its_spring_far() {
         joint.load(1.47);
         let (_, furthest) = joint.run(0.0, 1_000, Pushed::angle);
         assert!((joint.angle() - 2.42).abs() < 0.01 && furthest < 2.5, "{furthest} rad");
-        let (fastest, _) = joint.run(2.0, 5_000, Pushed::velocity);
+        let (fastest, _) = joint.run(2.0, 7_000, Pushed::velocity);
         assert!((joint.angle() - 1.22).abs() < 0.01, "{} rad", joint.angle());
         assert!(fastest > -0.6, "{fastest} rad/s");
     }
 }
 
 #[test]
-fn a_joint_blocked_beyond_its_limit_turns_a_tenth_of_a_radian_when_it_is_freed() {
+fn a_joint_blocked_beyond_its_limit_turns_a_quarter_of_a_radian_when_it_is_freed() {
     for mut joint in Pushed::each(2.2) {
         if joint.is_coarse() {
             continue; // the integral of a blocked loop of ours throws a joint anywhere
         }
         let block = joint.turn();
-        for _ in 0..10_000 {
-            joint.station.drive.shaft_mut().set_angle(block * joint.sign);
+        for ms in 0_u16..10_000 {
+            // It trembles at 2 Hz.
+            let tremble = if ms % 500 < 250 { 0.03 } else { 0.0 };
+            joint.station.drive.shaft_mut().set_angle((block + tremble) * joint.sign);
             joint.station.drive.shaft_mut().set_velocity(0.0);
             joint.run(6.0, 1, Pushed::angle);
         }
         let (least, _) = joint.run(6.0, 200, Pushed::angle);
         // With the way at 0.5 rad/s.
-        assert!(least > 2.2 - 0.23, "{}: {least} rad", joint.name);
+        assert!(least > 2.2 - 0.36, "{}: {least} rad", joint.name);
         joint.run(6.0, 4_000, Pushed::angle);
         assert!((joint.angle() - 1.0).abs() < 0.02, "{}: {} rad", joint.name, joint.angle());
     }
@@ -335,6 +337,12 @@ fn a_velocity_of_zero_and_a_slow_one_beyond_a_limit_hold_a_load_and_an_inward_on
         assert!(most < 1.5, "{}: {most} rad", joint.name);
         let (_, most) = joint.run(-0.3, 10_000, Pushed::angle);
         assert!(most < 1.15, "{}: {most} rad", joint.name);
+        // A velocity that changes between slow and fast neither.
+        for fast in 0_u8..100 {
+            let inward = if fast % 2 == 0 { -0.49 } else { -0.51 };
+            let (_, most) = joint.run(inward, 100, Pushed::angle);
+            assert!(most < 1.15, "{}: {most} rad", joint.name);
+        }
         // The torque of a faster inward velocity is as large as anywhere.
         let (_, most) = joint.run(-6.0, 1_000, Pushed::angle);
         assert!(most < 1.15 && joint.angle() < 0.0, "{}: {most} rad", joint.name);
@@ -369,5 +377,25 @@ fn a_joint_that_was_moved_while_its_motor_rested_is_not_thrown_back() {
                 joint.name
             );
         }
+    }
+}
+
+#[test]
+fn silences_let_a_loaded_joint_beyond_its_limit_no_further_out() {
+    for mut joint in Pushed::each(1.2) {
+        if joint.is_coarse() {
+            continue;
+        }
+        joint.run(0.0, 300, Pushed::angle);
+        joint.load(1.0);
+        for silence in 0_u8..20 {
+            joint.station.is_deaf = true;
+            joint.station.steps(20, |_| {});
+            joint.station.is_deaf = false;
+            joint.station.steps(3, |_| {});
+            let (_, most) = joint.run(0.0, 480, Pushed::angle);
+            assert!(most < 1.5, "{}, {silence}: {most} rad", joint.name);
+        }
+        assert!(joint.angle() < 1.3, "{}: {} rad", joint.name, joint.angle());
     }
 }

@@ -246,14 +246,14 @@ impl Reference {
         let step = if was_running { now.saturating_sub(before) } else { 0 };
         self.quiet_us = if moves_on { self.quiet_us + step.min(LONGEST_STEP_US) } else { 0 };
         let loses_time = !moves_on || is_shielded && !device_moves_on;
-        // Before its first update, a motor without feedback has no time.
-        let is_dated = was_running || self.rules.late_us.is_some();
         let takes_turns = self.rules.bad_step == BadStep::Repeats;
         // Where ages are compared anyway, a motor is offline for its age, and no target of it is forgotten.
         let is_compared = !loses_time && (has_step || !takes_turns);
-        let is_pause = now.saturating_sub(before) > LONGEST_PAUSE_US;
-        if is_dated && (is_pause || !is_compared) {
-            self.forget_after_a_pause(before, now);
+        // Before its first update, a motor without feedback has no other time.
+        let since = before.max(self.armed_at);
+        let is_pause = now.saturating_sub(since) > LONGEST_PAUSE_US;
+        if !loses_time && (is_pause || !is_compared) {
+            self.forget_after_a_pause(since, now);
         }
         if loses_time {
             self.lose_time(now);

@@ -69,3 +69,27 @@ fn an_arming_at_an_earlier_time_makes_no_target_younger() {
     step(&mut bus, 3);
     assert_eq!((sent(&mut bus), bus.is_armed()), (std::vec![(0x200, [0; 4])], false));
 }
+
+/// Of 11 slots, nine lie between both motors. The journal has room for 12 edges.
+#[test]
+fn a_free_slot_has_no_edge_of_a_clock_that_went_back() {
+    let mut bus = Bus::new();
+    bus.attach(Config::<M3508>::at_once(1)).unwrap();
+    bus.attach(Config::<Gm6020Voltage>::new(7)).unwrap();
+    let run = |bus: &mut Bus, times: core::ops::Range<u64>, ids: &[u16]| {
+        for ms in times {
+            for id in ids {
+                assert_eq!(bus.ingest(&feedback(*id, 0, 0), at_ms(ms)), Ingest::Taken);
+            }
+            step(bus, ms);
+        }
+    };
+    run(&mut bus, 1_000..1_100, &[0x201, 0x20B]);
+    while bus.next_edge().is_some() {}
+    run(&mut bus, 1_050..3_000, &[0x201, 0x20B]);
+    run(&mut bus, 3_000..3_200, &[0x20B]);
+    let offline = core::iter::from_fn(|| bus.next_edge())
+        .filter(|edge| edge.condition == Condition::Offline)
+        .map(|edge| (edge.source.id(), edge.at.as_micros() / 1_000));
+    assert_eq!(offline.collect::<Vec<_>>(), [(1, 3_099)]);
+}

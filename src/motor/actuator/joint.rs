@@ -190,10 +190,10 @@ const BRAKING_S: f32 = 0.1;
 const SLOW: f32 = 4.0;
 /// An outward velocity beyond a limit leads back, at most so fast in rad/s.
 const BACK: f32 = 0.5;
-/// An angle leads so much further than a load has stretched the spring, in rad: a blocked shaft turns no further at once when freed.
-const AHEAD: f32 = 0.1;
-/// A shaft that is pushed outward moves more than this, in rad: more than its feedback is off.
-const PUSH: f32 = 0.025;
+/// An angle in the place of a velocity leads the shaft by at most this way in rad, or by the way in this time in s: a blocked shaft turns
+/// no further at once when freed.
+const AHEAD: f32 = 0.25;
+const AHEAD_S: f32 = 0.2;
 /// The way to a limit in rad over which an outward torque falls to zero.
 const FADING: f32 = 0.02;
 /// The longest way in rad to an angle, so that the shortest way leads in the same direction.
@@ -290,7 +290,6 @@ impl Inside {
 pub(super) struct Start {
     angle: Option<Angle>,
     velocity: Option<AngularVelocity>,
-    /// Of a motor at rest none: the shaft may turn.
     pub(super) lead: Option<Lead>,
 }
 
@@ -299,9 +298,8 @@ pub(super) struct Start {
 pub(super) struct Lead {
     angle: Angle,
     inward: f32,
-    /// A load pushes a shaft that is further outward than this, and has stretched the spring so far, in rad.
-    outmost: f32,
-    stretch: f32,
+    /// How far outward of the angle the shaft is, in rad.
+    out: f32,
 }
 
 impl Start {
@@ -333,8 +331,7 @@ impl Start {
         })
     }
 
-    /// Returns the angle in the place of a velocity, where a damper would give way to a load: the angle moves inward alone. `None` between
-    /// the limits, and for a fast inward velocity.
+    /// Returns the angle in the place of a velocity beyond a limit, where a damper would give way to a load: the angle moves inward alone.
     fn lead(&mut self, target: Target, inside: Option<Inside>, dt_s: Option<f32>) -> Option<Angle> {
         let (before, Inside { lower, upper, here, .. }) = (self.lead.take(), inside?);
         let (limit, side) = if here >= upper { (upper, 1.0) } else { (lower, -1.0) };
@@ -342,22 +339,18 @@ impl Start {
             return None;
         };
         let wanted = -side * velocity.as_rad_per_s();
-        let way = wanted.abs().min(BACK) * dt_s?;
-        if wanted > BACK {
-            return None;
-        }
-        let angle = Angle::from_radians(here);
-        let begin = Lead { angle, inward: 0.0, outmost: PUSH, stretch: 0.0 };
-        let Lead { angle, inward, mut outmost, mut stretch } = before.unwrap_or(begin);
-        let out = side * (here - angle.as_radians());
-        if out > outmost {
-            (outmost, stretch) = (out, stretch.max(out + inward));
-        }
-        let outmost = outmost.min(out + PUSH);
+        let speed = if wanted > 0.0 { wanted } else { BACK.min(-wanted) };
+        let ahead = AHEAD.max(AHEAD_S * speed);
+        let anew = Lead { angle: Angle::from_radians(here), inward: 0.0, out: 0.0 };
+        let out_of = |lead: &Lead| side * (here - lead.angle.as_radians());
+        // A shaft that was turned further while the motor rested is not pulled back.
+        let lead = before.filter(|lead| out_of(lead) - lead.out < AHEAD).unwrap_or(anew);
+        let (Lead { angle, inward, .. }, out) = (lead, out_of(&lead));
         // An inward velocity leads past the limit, an outward one to it.
         let end = if wanted > 0.0 { f32::MAX } else { side * (angle.as_radians() - limit) };
-        let inward = (inward + way).min(end).min(stretch + AHEAD - out).max(inward);
-        self.lead = Some(Lead { angle, inward, outmost, stretch });
+        // No further outward than before, and than the shaft.
+        let inward = (inward + speed * dt_s?).min(ahead - out).min(end).max(inward).max(-out);
+        self.lead = Some(Lead { angle, inward, out });
         Some(angle - Angle::from_radians(side * inward))
     }
 
@@ -509,21 +502,23 @@ mod tests {
                 (2.5, 3.0, Some(2.45)),
                 (2.45, 0.0, Some(2.45)),
                 (2.5, 0.2, Some(2.43)),
-                (2.9, 9.0, Some(2.38)), // pushed: the spring is stretched by 0.47 rad
-                (2.9, 9.0, Some(2.33)),
-                (2.9, 9.0, Some(2.33)), // 0.57 rad ahead
-                (2.8, 9.0, Some(2.28)),
-                (2.3, 9.0, Some(2.23)),
-                (2.3, -0.2, Some(2.21)),
-                (2.3, -0.6, None),
-                (2.3, 0.1, Some(2.29)), // anew
-                (2.0, 9.0, Some(2.24)),
+                (2.65, 9.0, Some(2.4)), // 0.25 rad ahead
+                (2.7, 0.0, Some(2.4)),  // pushed
+                (2.6, 9.0, Some(2.35)),
+                (2.6, 9.0, Some(2.35)),
+                (2.3, 9.0, Some(2.3)), // no further outward than the shaft
+                (2.3, -0.2, Some(2.28)),
+                (2.3, -0.6, Some(2.22)),
+                (2.3, 0.1, Some(2.21)),
+                (2.0, 9.0, Some(2.0)),
                 (1.99, 9.0, None),
                 (2.0, 9.0, Some(2.0)),
                 (2.0, 9.0, Some(2.0)),
                 (2.0, -0.5, Some(1.95)),
-                (2.0, -0.5, Some(1.9)),
-                (2.0, -0.5, Some(1.9)), // 0.1 rad ahead
+                (2.0, -2.0, Some(1.75)),
+                (2.0, -2.0, Some(1.6)), // the way in 0.2 s ahead
+                (2.0, -0.5, Some(1.6)),
+                (2.3, -0.5, Some(2.25)), // anew
             ]
             .into_iter()
             .enumerate()

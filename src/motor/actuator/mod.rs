@@ -133,6 +133,7 @@ impl<M: DriveProtocol> Actuator<M> {
     pub fn with_health(mut self, config: &'static HealthConfig) -> Result<Self, &'static str> {
         self.is_steady = false;
         self.watch = self.watch.with_config(config)?;
+        self.start.lead = None;
         if self.is_absolute() && self.joint.has_zero_of_drive() {
             match config.soft_limits {
                 Some((lower, upper)) if upper - lower >= TAU => {
@@ -167,6 +168,7 @@ impl<M: DriveProtocol> Actuator<M> {
     #[must_use]
     pub fn reversed(mut self) -> Self {
         self.joint.sign = -self.joint.sign;
+        self.start.lead = None;
         self
     }
 

@@ -296,7 +296,6 @@ impl<M: DriveProtocol> Actuator<M> {
     /// for feedback.
     fn act(&mut self, may_drive: bool) -> Option<CanFrame> {
         if !may_drive || !self.power.is_ready() {
-            self.start.lead = None;
             // A late motor keeps its integral, one without a target starts afresh.
             if !self.guard.has_target() {
                 self.relax();

@@ -128,12 +128,11 @@ impl HealthConfig {
     ///
     /// * An angle is reached by the shortest way that stays inside; an angle outside is the limit next to it.
     /// * An outward velocity is at most the distance to the limit divided by 0.1 s. At the limit and beyond, a mode with
-    ///   [`Capability::Angle`](crate::motor::Capability::Angle) follows an angle in its place: from where the shaft was found, the angle moves to the
-    ///   limit, no faster than 0.5 rad/s and than the target, and never outward. A velocity of zero holds the angle, and an inward one of up to
-    ///   0.5 rad/s leads the angle past the limit. A load stretches the spring of a drive by the load divided by the stiffness; the angle leads
-    ///   by at most 0.1 rad more than a load has pushed the shaft, so a blocked shaft turns no further at once when it is freed, and a joint that
-    ///   lies on a stop needs a stiffness of ten times its load to leave the stop. A faster inward velocity is sent as it is: its damper pulls alone against
-    ///   the load.
+    ///   [`Capability::Angle`](crate::motor::Capability::Angle) follows an angle in the place of a velocity, from where the shaft was found: outward
+    ///   to the limit, no faster than 0.5 rad/s and than the target; zero holds the angle, and an inward velocity leads it inside. A load
+    ///   stretches the spring of a drive by the load divided by the stiffness. The angle leads the shaft by at most 0.25 rad, or the way in 0.2 s
+    ///   of a faster inward velocity, so a blocked shaft turns so far at once when it is freed, and a load above a quarter of the stiffness is
+    ///   held where it is. Inside, a damper alone follows the velocity again.
     /// * A mode without angles is led back by a velocity, no faster than 0.5 rad/s and than the target. There a velocity of zero stays zero.
     /// * The angle of an impedance is limited, its velocity as in a mode without angles, and its torque as below: the stiffness holds the load, and
     ///   a damper without stiffness holds up to its damping times 0.5 rad/s. A larger load pulls the joint on, and so does any load on a

@@ -124,7 +124,8 @@ impl<const N: usize> DeviceGuard<N> {
             return Err(self.lose_time(motors, before));
         }
         if !has_step {
-            return Err(self.hold(motors, before));
+            self.forget_bygones(motors, before);
+            return Err(self.hold(before));
         }
         if self.is_pause(before) {
             self.forget_bygones(motors, before);
@@ -150,7 +151,7 @@ impl<const N: usize> DeviceGuard<N> {
 
     /// Tells whether the pause before the present time was too long for the stamps.
     fn is_pause(&self, before: Instant) -> bool {
-        self.updated > before + LONGEST_PAUSE
+        self.updated > before.max(self.armed_at) + LONGEST_PAUSE
     }
 
     /// Returns the time after which the age of a motor exceeds its limit, at most `longest_us`; `None` if an age already does. A new target
@@ -190,12 +191,8 @@ impl<const N: usize> DeviceGuard<N> {
     ///
     /// Called wherever time passes without a comparison of ages.
     fn forget_bygones<M: Guarded>(&mut self, motors: &mut [M], before: Instant) {
-        let (now, is_pause, is_running) =
-            (self.updated.stamp(), self.is_pause(before), self.is_running);
-        self.change_all(motors, self.updated, |motor| {
-            let guard = motor.guard();
-            guard.forget_bygones(now, is_pause && (is_running || guard.listens));
-        });
+        let (now, is_pause) = (self.updated.stamp(), self.is_pause(before));
+        self.change_all(motors, self.updated, |motor| motor.guard().forget_bygones(now, is_pause));
     }
 
     /// Notes feedback before the first update, which moves the time on.
@@ -251,8 +248,7 @@ impl<const N: usize> DeviceGuard<N> {
 
     /// Ends an update without a usable step.
     #[cold]
-    fn hold<M: Guarded>(&mut self, motors: &mut [M], before: Instant) -> Hold {
-        self.forget_bygones(motors, before);
+    fn hold(&mut self, before: Instant) -> Hold {
         self.is_running = true;
         self.disturb();
         let (repeats, is_late) =
@@ -264,7 +260,7 @@ impl<const N: usize> DeviceGuard<N> {
     /// Ends an update whose time did not move on: no age is known.
     #[cold]
     pub(crate) fn lose_time<M: Guarded>(&mut self, motors: &mut [M], before: Instant) -> Hold {
-        self.hold(motors, before);
+        self.hold(before);
         // No target is left, so an update before the arming can make no target younger.
         self.armed_at = self.updated;
         self.change_all(motors, self.updated, |motor| motor.guard().lose_time());

@@ -75,6 +75,9 @@ impl MotorGuard {
         latch: Latch::NONE,
     };
 
+    /// The place of a motor.
+    pub(crate) const FREE: Self = Self { listens: false, ..Self::NEW };
+
     /// A motor without feedback, which counts as online.
     pub(crate) const DEAF: Self = Self { listens: false, link: Link::Online, ..Self::NEW };
 
@@ -347,7 +350,7 @@ impl MotorGuard {
 
     /// Handles a time that did not move on: no age is known. Feedback counts as late until the next frame, and the motor trips.
     pub(crate) fn lose_time(&mut self) {
-        self.latch.set(Condition::ClockFault, true);
+        self.latch.set(Condition::ClockFault, self.listens || self.link == Link::Online);
         if self.listens && self.link == Link::Online {
             self.set_late();
         }
