@@ -254,8 +254,7 @@ impl MotorGuard {
     /// Discards each stamp whose age a 32-bit counter can no longer represent; after a pause, discards all stamps.
     pub(crate) fn forget_bygones(&mut self, now: u32, is_pause: bool) {
         // The stamp of the beginning could lie ahead when it repeats.
-        let is_young = now.wrapping_sub(self.opened) < u32::from(self.opening_ms) * 1_000;
-        self.is_opening &= !is_pause || is_young;
+        self.is_opening &= !is_pause;
         let is_bygone = |stamp| is_pause || age(now, stamp) > LONGEST_PAUSE_US;
         if self.listens && self.link != Link::Unheard && is_bygone(self.heard) {
             self.lose();
