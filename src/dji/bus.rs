@@ -316,7 +316,7 @@ impl<B, const N: usize> Bus<B, N> {
         let Some(step) = TimeStep::usable(tick.dt_s(), TimeStep::MOTOR_MAX_S) else {
             return watch::end_without_step(&mut self.motors, &mut self.outbox, before);
         };
-        let is_quiet = self.motors.guard.is_quiet(before, self.motors.guard.updated());
+        let is_quiet = self.motors.guard.is_quiet(before, tick.now());
         if !is_quiet && !watch::apply_due(&mut self.motors, &mut self.outbox, before) {
             return;
         }

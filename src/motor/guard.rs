@@ -82,7 +82,9 @@ impl Guard {
     #[inline(never)]
     fn hear_anytime(&mut self, now: Instant) {
         self.device.disturb();
-        self.device.pass_unwatched(core::slice::from_mut(&mut self.motor), now);
+        if !self.device.is_running() {
+            self.device.pass_unwatched(core::slice::from_mut(&mut self.motor), now);
+        }
         let timeouts = *self.device.timeouts();
         self.change(now, |motor| motor.hear(now.stamp(), &timeouts));
     }

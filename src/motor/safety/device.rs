@@ -123,12 +123,11 @@ impl<const N: usize> DeviceGuard<N> {
         if !self.moves_on(before) {
             return Err(self.lose_time(motors, before));
         }
-        if !has_step {
+        if !has_step || self.is_pause(before) {
             self.forget_bygones(motors, before);
-            return Err(self.hold(before));
         }
-        if self.is_pause(before) {
-            self.forget_bygones(motors, before);
+        if !has_step {
+            return Err(self.hold(before));
         }
         self.is_running = true;
         self.held_steps = 0;
@@ -197,10 +196,8 @@ impl<const N: usize> DeviceGuard<N> {
 
     /// Notes feedback before the first update, which moves the time on.
     pub(crate) fn pass_unwatched<M: Guarded>(&mut self, motors: &mut [M], now: Instant) {
-        if !self.is_running {
-            let before = core::mem::replace(&mut self.updated, now);
-            self.forget_bygones(motors, before);
-        }
+        let before = core::mem::replace(&mut self.updated, now);
+        self.forget_bygones(motors, before);
     }
 
     /// Changes each motor.
