@@ -186,6 +186,13 @@ impl Pushed {
         joints
     }
 
+    /// As [`each`](Self::each), without loops that a block winds up, by counts of 0.16 rad.
+    fn fine(angle: f32) -> Vec<Self> {
+        let joints: Vec<_> = Self::each(angle).into_iter().filter(|it| !it.is_coarse()).collect();
+        assert_eq!(joints.len(), 12);
+        joints
+    }
+
     /// Whether loops of ours with an integral, by a tachometer with a count of 0.16 rad, drive the joint.
     fn is_coarse(&self) -> bool {
         self.name.starts_with("vesc")
@@ -243,10 +250,7 @@ fn a_velocity_holds_a_joint_at_its_limit_for_a_minute_against_a_load_that_only_a
 
 #[test]
 fn a_velocity_leads_a_joint_far_outside_back_without_a_throw() {
-    for mut joint in Pushed::each(2.2) {
-        if joint.is_coarse() {
-            continue;
-        }
+    for mut joint in Pushed::fine(2.2) {
         let (mut furthest, mut fastest, mut jump) = (0.0_f32, 0.0_f32, 0.0_f32);
         for ms in 0_u16..5_000 {
             // Comes in half a second, when the output is open.
@@ -288,10 +292,7 @@ fn a_velocity_leads_an_arm_back_whose_weight_stretches_its_spring_far() {
 
 #[test]
 fn a_joint_blocked_beyond_its_limit_turns_a_quarter_of_a_radian_when_it_is_freed() {
-    for mut joint in Pushed::each(2.2) {
-        if joint.is_coarse() {
-            continue; // the integral of a blocked loop of ours throws a joint anywhere
-        }
+    for mut joint in Pushed::fine(2.2) {
         let block = joint.turn();
         for ms in 0_u16..10_000 {
             // It trembles at 2 Hz.
@@ -310,10 +311,7 @@ fn a_joint_blocked_beyond_its_limit_turns_a_quarter_of_a_radian_when_it_is_freed
 
 #[test]
 fn a_velocity_of_zero_and_a_slow_one_beyond_a_limit_hold_a_load_and_an_inward_one_leaves() {
-    for mut joint in Pushed::each(1.5) {
-        if joint.is_coarse() {
-            continue;
-        }
+    for mut joint in Pushed::fine(1.5) {
         joint.run(0.0, 300, Pushed::angle);
         joint.load(1.0);
         for held in [0.0, 0.001, -0.001, 0.0] {
@@ -352,10 +350,7 @@ fn a_velocity_of_zero_and_a_slow_one_beyond_a_limit_hold_a_load_and_an_inward_on
 /// A motor whose feedback is late rests meanwhile, and so does one whose program stands still: the joint is where it is.
 #[test]
 fn a_joint_that_was_moved_while_its_motor_rested_is_not_thrown_back() {
-    for mut joint in Pushed::each(1.2) {
-        if joint.is_coarse() {
-            continue;
-        }
+    for mut joint in Pushed::fine(1.2) {
         joint.run(2.0, 300, Pushed::angle);
         for step in [0.0, 0.001] {
             let is_hold = step == 0.0;
@@ -382,10 +377,7 @@ fn a_joint_that_was_moved_while_its_motor_rested_is_not_thrown_back() {
 
 #[test]
 fn silences_let_a_loaded_joint_beyond_its_limit_no_further_out() {
-    for mut joint in Pushed::each(1.2) {
-        if joint.is_coarse() {
-            continue;
-        }
+    for mut joint in Pushed::fine(1.2) {
         joint.run(0.0, 300, Pushed::angle);
         joint.load(1.0);
         for silence in 0_u8..20 {

@@ -34,7 +34,7 @@ fn a_clock_that_goes_back_trips_every_motor_and_leaves_no_feedback_fresh() {
     assert_eq!(bus.state(heard).unwrap().ambiguous_gaps, 0);
 }
 
-/// A 16-bit timer passed on as it is, with an application that stopped after one target.
+/// The clock is a 16-bit timer without an extension, and the application stopped after one target.
 #[test]
 fn a_clock_that_wraps_early_or_swings_drives_no_longer_than_the_deadline() {
     let wrap = |period_us: u64| move |tick: u64| 1_000 * tick % period_us;

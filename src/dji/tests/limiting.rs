@@ -1,4 +1,4 @@
-//! What comes between the update of the loops and the frames.
+//! Limits between the update of the loops and the frames.
 
 use super::*;
 use crate::motor::VelocityDrive;

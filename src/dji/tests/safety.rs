@@ -298,7 +298,7 @@ fn timeouts_that_would_drive_blindly_are_refused() {
     }
 }
 
-/// What has to become of a motor's target, reckoned anew in every tick.
+/// The expected target of a motor, calculated anew in each tick.
 #[derive(Default, Clone, Copy)]
 struct Watched {
     heard: u64,
@@ -371,8 +371,8 @@ fn each_of_several_motors_stops_at_its_own_limit_however_the_ages_are_mixed() {
     assert!(stops > 10_000, "{stops}");
 }
 
-/// What was heard one turn of the stamps ago, to the microsecond, is not fresh: neither when the first update comes that
-/// late, nor when the update that ends the pause has no usable time step.
+/// Feedback of one turn of the stamps ago, to the microsecond, is old: in a first update that late, and in an update without a usable time
+/// step at the end of the pause.
 #[test]
 fn a_pause_of_a_whole_turn_of_the_stamps_revives_nobody() {
     let turn = Duration::from_micros(1 << 32);

@@ -43,7 +43,7 @@ fn motors_that_are_not_all_attached_leave_their_slots_free() {
     assert_eq!(bus.acceptance_filter(), (0x200, 0x7FC));
 }
 
-/// What a bus sends and says in these milliseconds; each byte is the feedback of a motor, or none.
+/// Returns the frames, edges and states of a bus in these milliseconds. A bit of each byte of `heard` is the feedback of a motor.
 fn run<const N: usize>(mut bus: Bus<(), N>, ids: &[u8], heard: &[u8]) -> Vec<std::string::String> {
     let handles: Vec<_> = ids
         .iter()

@@ -125,7 +125,7 @@ fn a_speed_loop_that_is_changed_is_limited_as_the_one_it_was_attached_with() {
     }
 }
 
-/// Half way from the warning to the limit half of the output is left, whatever is asked for.
+/// At half of the way from the warning to the limit, half of the output is left for each kind of target.
 #[test]
 fn a_motor_that_is_warm_keeps_to_its_share_in_a_position_loop_too() {
     let strong = PidConfig::new(1_000.0, 0.0, 0.0);
