@@ -1,10 +1,10 @@
-//! Health of one motor outside of a bus: its vitals, and their checks.
+//! Health of one motor outside of a bus: its vitals, their checks, and its conditions.
 
 use super::{
-    Condition, Guard, Health, HealthConfig, Latch, Link, Monitor, MotorName, Rival, Sample,
-    Severity, Traffic, elapsed,
+    Condition, Conditions, Guard, Health, HealthConfig, Latch, Link, Monitor, MotorName, Rival,
+    Sample, Severity, Traffic, elapsed,
 };
-use crate::time::{Duration, Instant};
+use crate::time::{Duration, Edge, Instant};
 
 /// The checks of a motor without a configuration of its own.
 static USUAL: HealthConfig = HealthConfig::new();
@@ -258,44 +258,78 @@ impl Vitals {
     }
 }
 
-/// Feedback and updates for which no rule is due.
+/// Conditions and their unread edges.
 impl Guard {
-    /// Notes feedback within the [trusted](Self::trust) gap; otherwise returns `false`, and notes nothing.
-    #[inline]
-    pub(super) fn hear_in_time(&mut self, now: Instant) -> bool {
-        let now = now.stamp();
-        let since_update = now.wrapping_sub(self.device.now());
-        let is_in_time = self.motor.is_in_time(now) && self.motor.trusts(since_update);
-        if is_in_time {
-            self.motor.hear_in_time(now);
+    /// Sets whether a condition of the motor holds. A change is an edge, latched until read.
+    ///
+    /// The guard itself notes late and lost feedback and old targets.
+    pub fn note(&mut self, condition: Condition, holds: bool, now: Instant) {
+        self.latch(now, |latch| latch.set(condition, holds));
+    }
+
+    /// Runs a change of the conditions, and notes its consequences.
+    pub(super) fn latch<T>(&mut self, now: Instant, change: impl FnOnce(&mut Latch) -> T) -> T {
+        self.change(now, |motor| change(motor.latch_mut()))
+    }
+
+    /// Returns the conditions of the motor that hold.
+    #[must_use]
+    pub const fn conditions(&self) -> Conditions {
+        self.motor.latch().active()
+    }
+
+    /// Returns the oldest unread edge, with the name passed as `motor`: the guard has no name of its motor.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::motor::{Condition, Guard, MotorName};
+    /// use drivetrain::time::Instant;
+    ///
+    /// let at_ms = |ms: u64| Instant::from_micros(ms * 1_000);
+    /// let mut guard = Guard::new();
+    /// guard.hear(at_ms(1));
+    /// assert!(!guard.drives(at_ms(12)));
+    /// let edge = guard.next_edge(MotorName::new("mine", 1)).ok_or("none")?;
+    /// assert_eq!((edge.condition, edge.began), (Condition::Late, true));
+    /// assert_eq!(guard.next_edge(MotorName::new("mine", 1)), None);
+    /// # Ok::<(), &str>(())
+    /// ```
+    pub fn next_edge(&mut self, motor: MotorName) -> Option<Edge<Condition, MotorName>> {
+        let now = self.device.updated();
+        while let Some(entry) = self.device.journal_mut().pop() {
+            if self.motor.latch_mut().take(entry.condition, entry.began) {
+                let at = self.device.journal().time_of(&entry, now);
+                let (condition, began) = (entry.condition, entry.began);
+                return Some(Edge { source: motor, condition, began, at });
+            }
         }
-        is_in_time
+        let (condition, began) = self.motor.latch().next()?;
+        self.motor.latch_mut().take(condition, began);
+        Some(Edge { source: motor, condition, began, at: self.device.journal().last_time(now) })
     }
 
-    /// Trusts feedback after a shorter gap than this, once the motor was updated.
-    pub(super) fn trust(&mut self, gap_us: u32) {
-        let gap_us = gap_us.min(self.device.timeouts().late_us());
-        self.motor.trust(if self.device.is_running() { gap_us } else { 0 });
-    }
-
-    /// Returns the number of frames [in time](Self::hear_in_time) since the last call.
-    pub(super) const fn take_in_time(&mut self) -> u16 {
-        self.motor.take_in_time()
-    }
-
-    /// Moves the time on to a tick in which no rule has to be applied and the motor may be driven; otherwise returns `false`, and moves
-    /// nothing.
-    #[inline]
-    pub(super) fn goes_on(&mut self, now: Instant) -> bool {
-        let goes_on = self.device.is_quiet(self.device.updated(), now) && self.motor.drives();
-        if goes_on {
-            self.device.begin(now);
+    /// Returns the part of a motor's health that the guard holds.
+    pub(crate) const fn health(&self, motor: MotorName) -> Health {
+        Health {
+            motor,
+            link: self.link(),
+            armed: self.is_armed(),
+            conditions: self.conditions(),
+            feedback_hz: 0,
+            longest_gap: Duration::ZERO,
+            temperature_c: None,
+            error_code: 0,
+            saturated: 0,
+            refused_targets: self.refused_targets(),
+            forgotten_targets: self.forgotten_targets(),
+            ambiguous_gaps: 0,
         }
-        goes_on
     }
 
-    /// Ends the quiet time here, if the quiet time lasts longer: the next update then applies the rules.
-    pub(super) fn wake_at(&mut self, time: Instant) {
-        self.device.wake_at(time);
+    /// Returns the time of the edge that [`next_edge`](Self::next_edge) returns next: to read several motors in order.
+    pub(crate) fn next_edge_at(&self) -> Option<Instant> {
+        self.motor.latch().next()?;
+        let (journal, now) = (self.device.journal(), self.device.updated());
+        Some(journal.first_time(now).unwrap_or_else(|| journal.last_time(now)))
     }
 }
