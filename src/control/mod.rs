@@ -64,7 +64,6 @@ pub use filter::{Biquad, LowPass, Window};
 pub use identification::{Excitation, Identification, IdentificationError, Plant};
 pub(crate) use matrix::solved;
 pub use motion::{Motion, MotionFollower, Motions};
-pub(crate) use number::limited;
 pub use observer::LoadObserver;
 
 pub(crate) use pid::ErrorPid;

@@ -1,19 +1,7 @@
 //! Arithmetic with finite results, numbers of twice the precision of `f32`, and roots of functions.
 
-use crate::math;
+use crate::math::{self, limited};
 use core::ops::{Add, Div, Mul, Neg, Sub};
-
-/// Returns `value` within `lower..=upper`; the caller guarantees their order.
-#[inline]
-pub(crate) const fn limited(value: f32, lower: f32, upper: f32) -> f32 {
-    if value > upper {
-        upper
-    } else if value < lower {
-        lower
-    } else {
-        value
-    }
-}
 
 /// Returns `value`; if infinite, the largest number of its sign; if NaN, zero.
 #[inline]

@@ -296,6 +296,18 @@ const fn folded(rest: f32, half: f32, period: f32) -> f32 {
     if near >= -half && near < half { near } else { 0.0 }
 }
 
+/// Returns `value` within `lower..=upper`; the caller guarantees their order.
+#[inline]
+pub(crate) const fn limited(value: f32, lower: f32, upper: f32) -> f32 {
+    if value > upper {
+        upper
+    } else if value < lower {
+        lower
+    } else {
+        value
+    }
+}
+
 /// Returns the value in [0, `period`) that differs from `x` by whole periods.
 ///
 /// NaN, infinity and bad periods as in [`wrap`]. The result is the `f32` nearest to the exact value; if the nearest is `period`

@@ -1,6 +1,7 @@
 use super::IdentificationError;
-use crate::control::number::{Sum, limited};
+use crate::control::number::Sum;
 use crate::error::{ConfigError, check, positive};
+use crate::math::limited;
 use crate::time::TimeStep;
 
 /// Efforts for an [`Identification`](super::Identification): steps that swing the shaft within limits of effort, speed and way.

@@ -1,6 +1,7 @@
 use crate::control::motion::task::Task;
-use crate::control::number::{Wide, lesser, limited, reach, root};
+use crate::control::number::{Wide, lesser, reach, root};
 use crate::math;
+use crate::math::limited;
 
 /// In `f32`, where rounding may keep the steps from becoming close; then with the value in twice its precision, which takes one step,
 /// and more where the way hardly depends on the roots. The bracket halves where a step would leave it.

@@ -1,9 +1,10 @@
 use crate::control::motion::ascent::{Ascent, Beginning, Curve};
 use crate::control::motion::task::{self, Brake, Limits, Task};
 use crate::control::motion::{End, Motion, Phases};
-use crate::control::number::{self, Wide, limited};
+use crate::control::number::{self, Wide};
 use crate::control::shaping::{MotionLimits, ProfileState};
 use crate::error::{ConfigError, finite, positive};
+use crate::math::limited;
 
 /// A task after braking, and the way back to units of the position and seconds.
 #[derive(Debug, Default, Clone, Copy, PartialEq)]

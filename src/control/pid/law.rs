@@ -10,8 +10,8 @@
 
 use super::config::{DERIVATIVE_ON_ERROR, REST_DERIVATIVE, TRACK_OUTPUT};
 use super::{ErrorPid, Pid, UNKNOWN, limit_of};
-use crate::control::number::{finite, limited};
-use crate::math;
+use crate::control::number::finite;
+use crate::math::{self, limited};
 use crate::time::TimeStep;
 
 impl ErrorPid {
@@ -242,6 +242,12 @@ impl Pid {
         self.core.rejected = self.core.rejected.saturating_add(1);
         self.core.set_options(self.core.options | if rests { REST_DERIVATIVE } else { 0 });
         self.core.output
+    }
+
+    /// Keeps the integral within a range of the output around zero: the part passed by a limit beyond this loop, since a larger
+    /// integral would be wound up.
+    pub(crate) const fn keep_integral_between(&mut self, lowest: f32, highest: f32) {
+        self.core.integral = limited(self.core.integral, lowest, highest);
     }
 }
 

@@ -5,8 +5,9 @@ mod law;
 
 pub use config::PidConfig;
 
-use crate::control::number::{finite, friction, limited};
+use crate::control::number::{finite, friction};
 use crate::error::{ConfigError, check};
+use crate::math::limited;
 use config::{
     DERIVATIVE_ON_ERROR, INCREMENTAL, NOT_PLAIN, Parameters, REST_DERIVATIVE, TRACK_OUTPUT,
 };
@@ -276,12 +277,6 @@ impl Pid {
     #[must_use]
     pub const fn rejected(&self) -> u16 {
         self.core.rejected
-    }
-
-    /// Keeps the integral within a range of the output around zero: the part passed by a limit beyond this loop, since a larger
-    /// integral would be wound up.
-    pub(crate) const fn keep_integral_between(&mut self, lowest: f32, highest: f32) {
-        self.core.integral = limited(self.core.integral, lowest, highest);
     }
 
     /// Returns the feed-forward, as far as [`feed_forward`](Self::feed_forward) knows the setpoint too: as `measurement + error`.

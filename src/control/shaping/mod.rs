@@ -12,8 +12,8 @@ mod profile;
 
 pub use profile::{MotionLimits, Profile, ProfileState};
 
-use crate::control::number::limited;
 use crate::error::{ConfigError, check, positive};
+use crate::math::limited;
 use crate::time::TimeStep;
 
 /// Limits the rate of rise and fall of a value.

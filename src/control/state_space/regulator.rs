@@ -5,8 +5,9 @@ use crate::control::matrix::{
     Grid, apply, finite, identity, is_finite, largest, narrow, paired, solved, times, transposed,
     wide,
 };
-use crate::control::number::{self, Wide, limited};
+use crate::control::number::{self, Wide};
 use crate::error::{self, ConfigError, positive};
+use crate::math::limited;
 
 /// Holds a plant at a reference with the least cost of errors and effort: a linear-quadratic regulator of `N` states, `M` inputs.
 ///

@@ -1,9 +1,9 @@
 //! The control of a drive in impedance mode, and our own loops on torque.
 
 use super::{Impedance, Order, Target};
-use crate::control::{Pid, PidConfig, limited};
+use crate::control::{Pid, PidConfig};
 use crate::error::ConfigError;
-use crate::math::wrap_pi;
+use crate::math::{limited, wrap_pi};
 use crate::motor::{Capabilities, Capability};
 use crate::units::{Angle, AngularVelocity};
 

@@ -2,8 +2,7 @@
 
 use super::power::Reading;
 use super::{Impedance, Shaft, Target};
-use crate::control::limited;
-use crate::math::wrap_pi;
+use crate::math::{limited, wrap_pi};
 use crate::motor::{Condition, Latch, TargetError, check_soft_limits};
 use crate::units::{Angle, AngularVelocity};
 use core::f32::consts::TAU;

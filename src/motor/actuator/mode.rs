@@ -2,9 +2,9 @@
 //! that a drive is told.
 
 use super::{Impedance, ImpedanceControl, Order, Shaft, Target};
-use crate::control::{PidConfig, limited};
+use crate::control::PidConfig;
 use crate::error::ConfigError;
-use crate::math::wrap_pi;
+use crate::math::{limited, wrap_pi};
 use crate::motor::{Capabilities, Capability};
 use crate::units::AngularVelocity;
 use crate::wire::mit::Ranges;
