@@ -25,7 +25,7 @@ const EXTENDED: u32 = 1 << 29;
 const REMOTE: u32 = 1 << 30;
 /// Bytes are missing: one comparison distinguishes a whole standard data frame from all others.
 const SHORT: u32 = 1 << 31;
-pub(crate) const ID_MASK: u32 = 0x1FFF_FFFF;
+const ID_MASK: u32 = 0x1FFF_FFFF;
 
 /// Returns the id with these 11 bits; a number with more bits gives the largest id.
 pub(crate) fn standard_id(raw: u16) -> Id {
@@ -225,7 +225,7 @@ const fn key_of(header: u32, length: Length) -> u32 {
     if matches!(length, Length::L8) { header } else { header | SHORT }
 }
 
-pub(crate) fn header_of(id: Id) -> u32 {
+fn header_of(id: Id) -> u32 {
     match id {
         Id::Standard(id) => u32::from(id.as_raw()),
         Id::Extended(id) => id.as_raw() | EXTENDED,
@@ -297,6 +297,47 @@ impl defmt::Format for CanFrame {
             self.length(),
             self.data()
         );
+    }
+}
+
+/// Ids of CAN frames: a header, and a mask of its significant bits.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Pattern {
+    pub(crate) header: u32,
+    pub(crate) mask: u32,
+}
+
+impl Pattern {
+    /// No ids: a header never has all bits.
+    pub(crate) const NONE: Self = Self { header: u32::MAX, mask: u32::MAX };
+
+    pub(crate) const ANY: Self = Self { header: 0, mask: 0 };
+
+    /// Makes the pattern of data frames whose id agrees with an id in the bits of a mask.
+    pub(crate) fn of(id: Id, mask: u32) -> Self {
+        let mask = mask | !ID_MASK;
+        Self { header: header_of(id) & mask, mask }
+    }
+
+    pub(crate) const fn is_none(&self) -> bool {
+        self.header == u32::MAX
+    }
+
+    /// Adds ids. The bits that all ids have in common stay significant.
+    pub(crate) fn add(&mut self, other: Self) {
+        let mask = self.mask & other.mask & !(self.header ^ other.header);
+        *self = if self.is_none() { other } else { Self { header: other.header & mask, mask } };
+    }
+
+    /// Tells whether the id of a frame is among the ids.
+    #[inline]
+    pub(crate) const fn fits(&self, frame: &CanFrame) -> bool {
+        (frame.header() ^ self.header) & self.mask == 0
+    }
+
+    /// Tells whether a frame can fit both patterns.
+    pub(crate) const fn meets(&self, other: &Self) -> bool {
+        (self.header ^ other.header) & self.mask & other.mask == 0
     }
 }
 

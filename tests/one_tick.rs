@@ -163,7 +163,8 @@ fn an_actuator_with_a_speed_loop_is_driven_in_each_cycle_and_nothing_happens() {
     let clock = Cell::new(Instant::from_micros(1_000_000));
     let mut drive = Damiao::default();
     let drive = Stub::new(|frame: &CanFrame| drive.answer(frame));
-    let mut runner = Runner::new(Nb(drive), &clock, Actuator::new(motor));
+    let actuator = Actuator::new(motor).with_opening(Duration::ZERO);
+    let mut runner = Runner::new(Nb(drive), &clock, actuator);
     for _ in 0..PREPARATION {
         cycle(&mut runner, &clock, |_, _| {});
     }

@@ -8,8 +8,8 @@ use crate::error::ConfigError;
 use crate::frame::{CanFrame, standard_id};
 use crate::motor::Impedance;
 use crate::motor::{
-    Capabilities, Capability, Claim, DriveProtocol, Ingest, Inquiry, MotorName, Order, Preparation,
-    Settings, Shaft, TimeoutUnits, Vitals, WrongSetting, register_questions,
+    Capabilities, Capability, Claim, DriveProtocol, Goal, Ingest, Inquiry, MotorName, Order,
+    Preparation, Settings, Shaft, TimeoutUnits, Vitals, WrongSetting, inside, register_questions,
 };
 use crate::time::Duration;
 use crate::units::{Angle, AngularVelocity};
@@ -53,6 +53,7 @@ const CHECKED: [Register; 4] = [
 pub struct Motor {
     model: Model,
     id: u8,
+    command_id: u16,
     master_id: u16,
     timeout: TimeoutUnits,
     mode: Mode,
@@ -79,6 +80,7 @@ impl Motor {
         Ok(Self {
             model,
             id,
+            command_id: mode.base() + u16::from(id),
             master_id: u16::from(id) + 0x10,
             timeout: TimeoutUnits::USUAL,
             mode,
@@ -95,7 +97,7 @@ impl Motor {
     /// [`ConfigError::Range`] for another id; [`ConfigError::Conflict`] for the id of the motor's own commands.
     pub fn with_master_id(self, master_id: u16) -> Result<Self, ConfigError> {
         ConfigError::check_range("master id", master_id.into(), 0.0, 2046.0)?;
-        if [self.command_id(), self.id.into()].contains(&master_id) {
+        if [self.command_id, self.id.into()].contains(&master_id) {
             return Err(ConfigError::Conflict("master id"));
         }
         Ok(Self { master_id, ..self })
@@ -113,7 +115,7 @@ impl Motor {
     #[must_use]
     pub const fn feedback(&self) -> Option<Feedback> {
         match self.status {
-            Some(_) => Feedback::decode(&self.report, self.model.ranges()),
+            Some(_) => Feedback::decode(&self.report, &self.model.ranges),
             None => None,
         }
     }
@@ -127,16 +129,30 @@ impl Motor {
     fn shaft(&self) -> Shaft {
         let is_heard = self.status.is_some();
         let unheard = (None, AngularVelocity::ZERO);
-        if is_heard { Feedback::shaft(&self.report, self.model.ranges()) } else { unheard }
-    }
-
-    const fn command_id(&self) -> u16 {
-        self.mode.base() + self.id as u16
+        if is_heard { Feedback::shaft(&self.report, &self.model.ranges) } else { unheard }
     }
 
     #[inline]
     fn frame_of(&self, data: [u8; 8]) -> CanFrame {
-        CanFrame::of(standard_id(self.command_id()), data)
+        CanFrame::of(standard_id(self.command_id), data)
+    }
+
+    /// Returns the data of the command to the drive, within the share of its largest effort; `None` to rest.
+    #[inline]
+    fn command(&mut self, order: Order) -> Option<[u8; 8]> {
+        let (report, ranges) = (self.status.map(|_| &self.report)?, &self.model.ranges);
+        let shaft = || Feedback::shaft(report, ranges);
+        let command = match self.mode.0.impedance_goal(order, shaft, ranges, 4_095)? {
+            Goal::Torque(torque_nm) => return Some(ranges.encode_torque(torque_nm)),
+            Goal::Impedance(command) => Command::Mit(command),
+            Goal::Velocity(velocity) => Command::Velocity(velocity),
+            Goal::Way(way) => {
+                let position = Feedback::decode(report, ranges)?.measured.position_rad;
+                let position = inside(position, way, ranges.position_rad());
+                self.mode.toward(position, order.share, &self.model)
+            }
+        };
+        Some(command.encode(ranges))
     }
 
     /// Returns the configured value of a register.
@@ -167,7 +183,7 @@ impl DriveProtocol for Motor {
         let bare = (self.mode.base() > 0).then(|| command(self.id.into()));
         let feedback = Claim::feedback(standard_id(self.master_id), self.name());
         let shared = [command(REGISTERS).shared(), feedback.shared()];
-        [command(self.command_id())].into_iter().chain(bare).chain(shared)
+        [command(self.command_id)].into_iter().chain(bare).chain(shared)
     }
 
     fn decode(&mut self, frame: &CanFrame) -> Ingest {
@@ -196,7 +212,7 @@ impl DriveProtocol for Motor {
 
     fn rest(&mut self) -> CanFrame {
         if self.mode.0.is_impedance() {
-            let rest = self.model.ranges().encode(&Impedance::FREE);
+            let rest = self.model.ranges.encode(&Impedance::FREE);
             CanFrame::of(standard_id(self.id.into()), rest)
         } else {
             self.off()
@@ -204,8 +220,7 @@ impl DriveProtocol for Motor {
     }
 
     fn control(&mut self, order: Order) -> CanFrame {
-        let report = self.status.map(|_| &self.report);
-        match report.and_then(|report| self.mode.command(order, report, &self.model)) {
+        match self.command(order) {
             Some(data) => self.frame_of(data),
             None => self.rest(),
         }
@@ -240,7 +255,7 @@ impl DriveProtocol for Motor {
 
     fn poll(&mut self) -> Option<CanFrame> {
         let stay = self.feedback().and_then(|drive| self.mode.stay(&drive));
-        let frame = |stay: Command| self.frame_of(stay.encode(self.model.ranges()));
+        let frame = |stay: Command| self.frame_of(stay.encode(&self.model.ranges));
         Some(stay.map_or_else(|| refresh(self.id), frame))
     }
 
@@ -280,15 +295,15 @@ impl DriveProtocol for Motor {
     fn vitals(&self) -> Vitals {
         let Some(status) = self.status else { return Vitals::default() };
         let [_, a, b, c, d, e, driver_c, rotor_c] = self.report;
-        let measured = self.model.ranges().decode_feedback(&[a, b, c, d, e]);
+        let measured = self.model.ranges.decode_feedback(&[a, b, c, d, e]);
         Vitals {
             temperature_c: Some(driver_c.max(rotor_c).into()),
             has_fault: status.is_error(),
             has_warning: false,
             error_code: status.error_code(),
             effort: self.mode.0.effort(),
-            speed: measured.velocity_rad_per_s / self.model.vmax_rad_per_s(),
-            current: measured.torque_nm / self.model.tmax_nm(),
+            speed: measured.velocity_rad_per_s / self.model.ranges.velocity_rad_per_s(),
+            current: measured.torque_nm / self.model.ranges.torque_nm(),
         }
     }
 }
@@ -306,7 +321,7 @@ impl Motor {
     fn special(&mut self, data: [u8; 8]) -> CanFrame {
         self.specials = self.specials.wrapping_add(1);
         let is_bare = self.specials & 1 == 0;
-        let id = if is_bare { self.id.into() } else { self.command_id() };
+        let id = if is_bare { self.id.into() } else { self.command_id };
         CanFrame::of(standard_id(id), data)
     }
 }

@@ -3,7 +3,7 @@
 use super::codec::{Command, MOST_VELOCITY};
 use super::{Feedback, Model};
 use crate::error::ConfigError;
-use crate::motor::{ControlMode, Goal, ImpedanceControl, Order, inside};
+use crate::motor::{ControlMode, ImpedanceControl};
 use crate::units::AngularVelocity;
 
 /// A control mode of the drive. An [`ImpedanceControl`] is also a mode: MIT mode, where the drive follows an impedance.
@@ -72,29 +72,8 @@ impl Mode {
         self.0.check(vmax.min(model.vmax_rad_per_s()), 0.0, model.tmax_nm())
     }
 
-    /// Returns the data of the command to the drive, within the share of its largest effort; `None` to rest.
-    #[inline]
-    pub(super) fn command(
-        &mut self,
-        order: Order,
-        report: &[u8; 8],
-        model: &Model,
-    ) -> Option<[u8; 8]> {
-        let shaft = || Feedback::shaft(report, model.ranges());
-        let command = match self.0.impedance_goal(order, shaft, model.ranges(), 4_095)? {
-            Goal::Torque(torque_nm) => return Some(model.ranges().encode_torque(torque_nm)),
-            Goal::Impedance(command) => Command::Mit(command),
-            Goal::Velocity(velocity) => Command::Velocity(velocity),
-            Goal::Way(way) => {
-                let position = Feedback::decode(report, model.ranges())?.measured.position_rad;
-                let position = inside(position, way, model.pmax_rad());
-                self.toward(position, order.share, model)
-            }
-        };
-        Some(command.encode(model.ranges()))
-    }
-
-    fn toward(&self, position: f32, share: f32, model: &Model) -> Command {
+    /// Returns a command to go to a position of the drive, within the share of the largest effort.
+    pub(super) fn toward(&self, position: f32, share: f32, model: &Model) -> Command {
         let limit = self.0.most_velocity();
         match self.0.torque_limit_nm() {
             Some(torque_nm) => {

@@ -41,7 +41,7 @@ use crate::wire::mit::Ranges;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Model {
     name: &'static str,
-    ranges: Ranges,
+    pub(super) ranges: Ranges,
 }
 
 models! {

@@ -1,6 +1,6 @@
 //! Names of motors, and the CAN ids that the motors claim.
 
-use crate::frame::CanFrame;
+use crate::frame::{CanFrame, Pattern};
 use embedded_can::Id;
 
 /// A CAN id, or a block of ids under a mask, of one motor.
@@ -103,9 +103,9 @@ impl Claim {
         extended == other_extended && (raw ^ other_raw) & self.mask & other.mask == 0
     }
 
-    /// Returns the header of frames with the id, and the significant bits of the header.
-    pub(crate) fn pattern(&self) -> (u32, u32) {
-        (crate::frame::header_of(self.id), self.mask | !crate::frame::ID_MASK)
+    /// Returns the ids as a pattern.
+    pub(crate) fn pattern(&self) -> Pattern {
+        Pattern::of(self.id, self.mask)
     }
 
     /// Returns the id.
@@ -205,9 +205,9 @@ pub(crate) struct Route {
     shared: Pattern,
     command: Pattern,
     /// The first claim of feedback.
-    usual: Pattern,
-    /// The same; fits nothing where a command may have such an id too.
-    certain: Pattern,
+    pub(super) usual: Pattern,
+    /// The same; fits nothing where a command may have such an id too. A frame that fits is feedback for certain.
+    pub(super) certain: Pattern,
 }
 
 impl Route {
@@ -231,18 +231,18 @@ impl Route {
         let mut route = Self::NONE;
         for claim in claims() {
             if claim.is_feedback() && route.usual.is_none() {
-                route.usual = Pattern::of(&claim);
+                route.usual = claim.pattern();
             }
             match (claim.is_feedback(), claim.is_shared()) {
-                (true, true) => route.shared.add(&claim),
-                (true, false) => route.feedback.add(&claim),
+                (true, true) => route.shared.add(claim.pattern()),
+                (true, false) => route.feedback.add(claim.pattern()),
                 (false, true) => {}
-                (false, false) => route.command.add(&claim),
+                (false, false) => route.command.add(claim.pattern()),
             }
         }
         let mut commands =
             claims().into_iter().filter(|claim| !claim.is_feedback() && !claim.is_shared());
-        if !commands.any(|claim| Pattern::of(&claim).meets(&route.usual)) {
+        if !commands.any(|claim| claim.pattern().meets(&route.usual)) {
             route.certain = route.usual;
         }
         route
@@ -250,63 +250,8 @@ impl Route {
 
     /// Tells whether a frame may concern the motor; false for most frames of others, and for every remote frame.
     #[inline]
-    pub(crate) const fn fits(&self, frame: &CanFrame) -> bool {
+    pub(super) const fn fits(&self, frame: &CanFrame) -> bool {
         self.feedback.fits(frame) || self.command.fits(frame) || self.shared.fits(frame)
-    }
-
-    /// Returns header and mask of the usual feedback; all bits if there is none.
-    #[inline]
-    pub(crate) const fn usual(&self) -> (u32, u32) {
-        (self.usual.header, self.usual.mask)
-    }
-
-    /// Tells whether a frame is the motor's usual feedback for certain, and no command of another node.
-    #[inline]
-    pub(crate) const fn is_feedback(&self, frame: &CanFrame) -> bool {
-        self.certain.fits(frame)
-    }
-}
-
-/// The bits that the ids of some claims have in common.
-#[derive(Debug, Clone, Copy)]
-struct Pattern {
-    header: u32,
-    mask: u32,
-}
-
-impl Pattern {
-    /// Fits nothing: no header has all bits.
-    const NONE: Self = Self { header: u32::MAX, mask: u32::MAX };
-
-    const ANY: Self = Self { header: 0, mask: 0 };
-
-    fn of(claim: &Claim) -> Self {
-        let (header, mask) = claim.pattern();
-        Self { header: header & mask, mask }
-    }
-
-    const fn is_none(&self) -> bool {
-        self.header == u32::MAX
-    }
-
-    fn add(&mut self, claim: &Claim) {
-        let Self { header, mask } = Self::of(claim);
-        *self = if self.is_none() {
-            Self { header, mask }
-        } else {
-            let mask = self.mask & mask & !(self.header ^ header);
-            Self { header: header & mask, mask }
-        };
-    }
-
-    #[inline]
-    const fn fits(&self, frame: &CanFrame) -> bool {
-        (frame.header() ^ self.header) & self.mask == 0
-    }
-
-    /// Tells whether some header fits both.
-    const fn meets(&self, other: &Self) -> bool {
-        (self.header ^ other.header) & self.mask & other.mask == 0
     }
 }
 
@@ -378,7 +323,7 @@ mod tests {
                     let concerns = is_feedback || covered(false, false);
                     assert!(route.fits(&frame) || !concerns, "{frame:?} of {claims:?}");
                     refused += u32::from(!route.fits(&frame));
-                    let is_certain = route.is_feedback(&frame);
+                    let is_certain = route.certain.fits(&frame);
                     let is_only = is_feedback && !covered(false, false);
                     assert!(!is_certain || is_only, "{frame:?} of {claims:?}");
                     certain += u32::from(is_certain);

@@ -13,7 +13,7 @@ use embedded_can::Frame;
 impl<M: DriveProtocol> CanDevice for Actuator<M> {
     #[inline]
     fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
-        if self.route.is_feedback(frame) {
+        if self.route.certain.fits(frame) {
             self.take(frame, now)
         } else if self.route.fits(frame) {
             self.take_by_claims(frame, now)
@@ -178,7 +178,7 @@ impl<M: DriveProtocol> Devices for Actuator<M> {
 
     #[inline]
     fn usual_feedback(&self) -> (u32, u32) {
-        self.route.usual()
+        (self.route.usual.header, self.route.usual.mask)
     }
 
     #[inline]
@@ -198,7 +198,8 @@ impl<M: DriveProtocol> VelocityDrive<()> for Actuator<M> {
     }
 
     fn set_velocity(&mut self, (): (), target: AngularVelocity) -> Result<(), TargetError> {
-        self.set(Capability::Velocity, Target::Velocity(target))
+        let of_drive = target.is_finite().then_some(target * self.joint.sign);
+        self.set(Capability::Velocity, of_drive.map(Target::Velocity).ok_or(TargetError::NotFinite))
     }
 }
 
@@ -208,6 +209,7 @@ impl<M: DriveProtocol> AngleDrive<()> for Actuator<M> {
     }
 
     fn set_angle(&mut self, (): (), target: Angle) -> Result<(), TargetError> {
-        self.set(Capability::Angle, Target::Angle(target))
+        let of_drive = self.joint.angle_of_drive(target).map(Target::Angle);
+        self.set(Capability::Angle, of_drive)
     }
 }

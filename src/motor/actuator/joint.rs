@@ -130,8 +130,31 @@ impl Joint {
         }
     }
 
-    fn angle_of_drive(&self, angle: Angle) -> Result<Angle, TargetError> {
-        Ok(self.zero().ok_or(TargetError::NotHomed)? + angle * self.sign)
+    /// Returns an angle of the joint as an angle of the drive.
+    ///
+    /// # Errors
+    /// [`TargetError::NotFinite`], and [`TargetError::NotHomed`] if the zero is lost.
+    pub(super) fn angle_of_drive(&self, angle: Angle) -> Result<Angle, TargetError> {
+        let zero = self.zero().ok_or(TargetError::NotHomed);
+        let angle = zero.unwrap_or(Angle::ZERO) + angle * self.sign;
+        if angle.is_finite() { zero.map(|_| angle) } else { Err(TargetError::NotFinite) }
+    }
+
+    /// Returns a spring of the joint as a spring of the drive.
+    ///
+    /// # Errors
+    /// As [`angle_of_drive`](Self::angle_of_drive).
+    pub(super) fn impedance_of_drive(&self, spring: Impedance) -> Result<Target, TargetError> {
+        let angle = self.angle_of_drive(spring.angle);
+        if !spring.is_finite() {
+            return Err(TargetError::NotFinite);
+        }
+        Ok(Target::Impedance(Impedance {
+            angle: angle?,
+            velocity: spring.velocity * self.sign,
+            torque_nm: spring.torque_nm * self.sign,
+            ..spring
+        }))
     }
 
     /// Tells whether limits of the joint count: the joint has a zero, or is given one.
@@ -151,24 +174,6 @@ impl Joint {
             upper: one.max(other),
             here,
             velocity: velocity.unwrap_or(0.0),
-        })
-    }
-
-    /// Returns the target in the direction of the drive.
-    ///
-    /// # Errors
-    /// [`TargetError::NotHomed`] for an angle whose zero is lost.
-    pub(super) fn target_of_drive(&self, target: Target) -> Result<Target, TargetError> {
-        Ok(match target {
-            Target::Torque(torque_nm) => Target::Torque(torque_nm * self.sign),
-            Target::Velocity(velocity) => Target::Velocity(velocity * self.sign),
-            Target::Angle(angle) => Target::Angle(self.angle_of_drive(angle)?),
-            Target::Impedance(impedance) => Target::Impedance(Impedance {
-                angle: self.angle_of_drive(impedance.angle)?,
-                velocity: impedance.velocity * self.sign,
-                torque_nm: impedance.torque_nm * self.sign,
-                ..impedance
-            }),
         })
     }
 }
@@ -411,16 +416,14 @@ mod tests {
     fn each_part_of_a_spring_is_that_of_the_drive_where_the_joint_is_turned_round() {
         let zero = Zero::Placed(Angle::from_radians(0.5));
         let joint = Joint { sign: -1.0, zero, ..Joint::DIRECT };
-        let spring = |angle, velocity, torque_nm| {
-            Target::Impedance(Impedance {
-                angle: Angle::from_radians(angle),
-                velocity: AngularVelocity::from_rad_per_s(velocity),
-                torque_nm,
-                ..Impedance::FREE
-            })
+        let spring = |angle, velocity, torque_nm| Impedance {
+            angle: Angle::from_radians(angle),
+            velocity: AngularVelocity::from_rad_per_s(velocity),
+            torque_nm,
+            ..Impedance::FREE
         };
-        let of_drive = joint.target_of_drive(spring(1.25, 2.0, 3.0));
-        assert_eq!(of_drive, Ok(spring(-0.75, -2.0, -3.0)));
+        let of_drive = joint.impedance_of_drive(spring(1.25, 2.0, 3.0));
+        assert_eq!(of_drive, Ok(Target::Impedance(spring(-0.75, -2.0, -3.0))));
     }
 
     #[test]

@@ -300,34 +300,6 @@ impl<M: DriveProtocol> Actuator<M> {
         load
     }
 
-    /// Sets the torque of the output shaft in Nm; positive is counter-clockwise.
-    ///
-    /// # Errors
-    /// Says why the motor cannot take the target now. The value is then not kept for later.
-    pub fn set_torque(&mut self, torque_nm: f32) -> Result<(), TargetError> {
-        self.set(Capability::Torque, Target::Torque(torque_nm))
-    }
-
-    /// Sets a spring and a damper at the output shaft, and a torque beside them.
-    ///
-    /// # Errors
-    /// As [`set_torque`](Self::set_torque), and [`TargetError::NotFinite`] for a stiffness or a damping below zero.
-    pub fn set_impedance(&mut self, target: Impedance) -> Result<(), TargetError> {
-        self.set(Capability::Impedance, Target::Impedance(target))
-    }
-
-    fn set(&mut self, kind: Capability, target: Target) -> Result<(), TargetError> {
-        if !self.motor.capabilities().has(kind) {
-            return Err(TargetError::Unsupported);
-        }
-        // Where there was no target, the command is of one before.
-        self.offered.may_repeat.end_without(self.guard.has_target());
-        let of_drive = self.joint.target_of_drive(target);
-        self.guard.admit(of_drive.unwrap_or(target).is_finite())?;
-        self.target = of_drive.inspect_err(|_| self.guard.relax())?;
-        Ok(())
-    }
-
     fn is_absolute(&self) -> bool {
         self.motor.capabilities().has(Capability::AbsoluteAngle)
     }
@@ -344,6 +316,39 @@ impl<M: DriveProtocol> Actuator<M> {
         let shaft = (self.motor.angle(), self.motor.velocity());
         let limits = self.watch.soft_limits();
         (shaft, limits.and_then(|limits| self.joint.inside(limits, shaft)))
+    }
+
+    /// Offers a frame for the drive's power.
+    const fn post(&mut self, frame: Option<CanFrame>) {
+        (self.switched, self.switching) = (frame, frame);
+        self.has_posted = frame.is_some();
+        self.has_frames = true;
+    }
+
+    fn offer(&mut self, command: Option<CanFrame>) {
+        self.withdraw();
+        let (frame, waits) = (command.or(self.offered.frame), command.is_some());
+        self.offered = Offered { frame, waits, ..Offered::NOTHING };
+        self.has_frames = true;
+    }
+
+    /// Takes back a frame still waiting for the bus.
+    fn withdraw(&mut self) {
+        if let (true, Some(frame)) = (core::mem::take(&mut self.offered.waits), self.offered.frame)
+        {
+            self.leave_out(&frame);
+        }
+    }
+
+    fn withdraw_switching(&mut self) {
+        if let Some(frame) = self.switching.take() {
+            self.leave_out(&frame);
+        }
+    }
+
+    fn leave_out(&mut self, frame: &CanFrame) {
+        self.superseded = self.superseded.wrapping_add(1);
+        self.motor.unsent(frame);
     }
 
     /// The drive did not follow before: its output opens from zero, and its angle starts from where the shaft is.

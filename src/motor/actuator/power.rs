@@ -23,9 +23,9 @@ const SETTLING: Duration = Duration::from_millis(20);
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Power {
     /// The wanted state.
-    on: bool,
+    pub(super) on: bool,
     /// The state reported by the drive since then; the opposite until the first report.
-    seen: Option<bool>,
+    pub(super) seen: Option<bool>,
     /// The drive followed.
     is_confirmed: bool,
     /// The time of the first call with this wanted state.
@@ -35,8 +35,6 @@ pub(super) struct Power {
     is_due: bool,
     /// The drive was never told.
     is_new: bool,
-    /// The time of the last update.
-    now: Instant,
 }
 
 impl Power {
@@ -49,14 +47,7 @@ impl Power {
         told: Instant::START,
         is_due: false,
         is_new: true,
-        now: Instant::START,
     };
-
-    /// Tells whether a report of the drive changes nothing.
-    #[inline]
-    pub(super) fn expects(&self, report: Option<bool>) -> bool {
-        report == self.seen && (report != Some(false) || !self.on)
-    }
 
     /// Takes the state reported by the drive with a feedback frame; `None` without a report. Returns whether the drive has
     /// reset: enabled before, and disabled now.
@@ -74,34 +65,31 @@ impl Power {
     pub(super) const fn begin(&mut self, now: Instant) -> bool {
         let is_new = self.is_new;
         if is_new {
-            self.now = now;
-            self.tell();
+            self.tell(now);
         }
         is_new
     }
 
-    /// Moves on to an update and takes the wanted state. Returns the state to be sent to the drive,
-    /// if a frame is due.
+    /// Takes the wanted state in an update. Returns the state to be sent to the drive, if a frame is due.
     pub(super) fn step(&mut self, on: bool, now: Instant) -> Option<bool> {
-        self.now = now;
         if on != self.on {
-            self.turn(on);
+            self.turn(on, now);
         }
         // The clock may have gone back.
         let is_over = |pause| now < self.told || now.since(self.told) >= pause;
         if !self.is_due && !self.pause().is_some_and(is_over) {
             return None;
         }
-        self.tell();
+        self.tell(now);
         Some(on)
     }
 
     /// Wants the drive to be disabled; returns whether a frame is due now.
-    pub(super) fn stop(&mut self) -> bool {
+    pub(super) fn stop(&mut self, now: Instant) -> bool {
         let stops = self.on || self.is_new;
         if stops {
-            self.turn(false);
-            self.tell();
+            self.turn(false, now);
+            self.tell(now);
         }
         stops
     }
@@ -126,31 +114,26 @@ impl Power {
         self.is_ready() && !self.is_due
     }
 
-    /// Moves on to an update in which nothing is due.
-    pub(super) const fn pass(&mut self, now: Instant) {
-        self.now = now;
-    }
-
     /// Tells whether the drive is wanted and reported as enabled.
     pub(super) fn is_confirmed(&self) -> bool {
         self.on && self.seen == Some(true)
     }
 
-    fn turn(&mut self, on: bool) {
+    fn turn(&mut self, on: bool, now: Instant) {
         *self = Self {
             on,
             seen: self.seen.map(|_| !on),
             is_confirmed: false,
-            since: self.now,
+            since: now,
             is_due: true,
             ..*self
         };
     }
 
-    const fn tell(&mut self) {
+    const fn tell(&mut self, now: Instant) {
         self.is_due = false;
         self.is_new = false;
-        self.told = self.now;
+        self.told = now;
     }
 
     fn pause(&self) -> Option<Duration> {

@@ -231,15 +231,6 @@ impl Target {
             Self::Torque(_) | Self::Velocity(_) => self,
         }
     }
-
-    pub(super) const fn is_finite(&self) -> bool {
-        match self {
-            Self::Torque(torque_nm) => torque_nm.is_finite(),
-            Self::Velocity(velocity) => velocity.is_finite(),
-            Self::Angle(angle) => angle.is_finite(),
-            Self::Impedance(impedance) => impedance.is_finite(),
-        }
-    }
 }
 
 /// A target with its limits, for one step: see [`DriveProtocol::control`](super::DriveProtocol::control).

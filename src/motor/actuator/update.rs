@@ -1,15 +1,16 @@
-//! The reaction of a motor to a frame of its drive, and its update.
+//! The reaction of a motor to a frame of its drive and to a target, and its update.
 
 use super::joint::{Inside, Start};
 use super::power::Reading;
-use super::{Actuator, DriveProtocol, INQUIRY, Offered, SILENCE_US};
+use super::{Actuator, DriveProtocol, INQUIRY, Impedance, SILENCE_US, Target};
 use crate::frame::CanFrame;
-use crate::motor::{Capability, Condition, Ingest, Link, Repeat, Route, Vitals};
+use crate::motor::{Capability, Condition, Ingest, Link, Repeat, Route, TargetError, Vitals};
 use crate::time::{Instant, TimeStep};
 use crate::units::Angle;
+use core::mem::discriminant;
 use embedded_can::Frame;
 
-/// Received frames: feedback, answers, and commands of another controller.
+/// Targets, and received frames: feedback, answers, and commands of another controller.
 impl<M: DriveProtocol> Actuator<M> {
     /// Takes a frame with an id of the feedback.
     pub(super) fn take(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
@@ -18,7 +19,8 @@ impl<M: DriveProtocol> Actuator<M> {
         }
         let outcome = self.motor.decode(frame);
         if outcome == Ingest::Taken {
-            let is_usual = self.power.expects(self.motor.is_enabled());
+            let (report, power) = (self.motor.is_enabled(), &self.power);
+            let is_usual = report == power.seen && (report != Some(false) || !power.on);
             if !is_usual || !self.guard.hear_in_time(now) {
                 self.hear(is_usual, now);
             }
@@ -106,6 +108,42 @@ impl<M: DriveProtocol> Actuator<M> {
         _ = self.watch.check(&mut self.guard, || vitals, now);
         self.guard.relax_until_armed();
     }
+
+    /// Sets the torque of the output shaft in Nm; positive is counter-clockwise.
+    ///
+    /// # Errors
+    /// Says why the motor cannot take the target now. The value is then not kept for later.
+    pub fn set_torque(&mut self, torque_nm: f32) -> Result<(), TargetError> {
+        let of_drive = torque_nm.is_finite().then_some(torque_nm * self.joint.sign);
+        self.set(Capability::Torque, of_drive.map(Target::Torque).ok_or(TargetError::NotFinite))
+    }
+
+    /// Sets a spring and a damper at the output shaft, and a torque beside them.
+    ///
+    /// # Errors
+    /// As [`set_torque`](Self::set_torque), and [`TargetError::NotFinite`] for a stiffness or a damping below zero.
+    pub fn set_impedance(&mut self, target: Impedance) -> Result<(), TargetError> {
+        self.set(Capability::Impedance, self.joint.impedance_of_drive(target))
+    }
+
+    /// Takes a target of the drive, or the reason why there is none.
+    pub(super) fn set(
+        &mut self,
+        kind: Capability,
+        target: Result<Target, TargetError>,
+    ) -> Result<(), TargetError> {
+        let is_kind = target.is_ok_and(|new| discriminant(&new) == discriminant(&self.target));
+        if !(is_kind && self.guard.has_target()) {
+            if !self.motor.capabilities().has(kind) {
+                return Err(TargetError::Unsupported);
+            }
+            // Where there was no target, the command is of one before.
+            self.offered.may_repeat.end_without(self.guard.has_target());
+        }
+        self.guard.admit(!matches!(target, Err(TargetError::NotFinite)))?;
+        self.target = target.inspect_err(|_| self.guard.relax())?;
+        Ok(())
+    }
 }
 
 impl<M: DriveProtocol> Actuator<M> {
@@ -113,11 +151,7 @@ impl<M: DriveProtocol> Actuator<M> {
     #[inline]
     pub(super) fn goes_on(&mut self, now: Instant) -> bool {
         let Vitals { has_fault, has_warning, error_code, .. } = self.motor.vitals();
-        let goes_on = !has_fault && !has_warning && error_code == 0 && self.guard.goes_on(now);
-        if goes_on {
-            self.power.pass(now);
-        }
-        goes_on
+        !has_fault && !has_warning && error_code == 0 && self.guard.goes_on(now)
     }
 
     /// Applies all rules: enables, disables, asks and rests, as the motor may be driven or not. Returns whether a command is due, of the goal
@@ -130,7 +164,6 @@ impl<M: DriveProtocol> Actuator<M> {
         let left = self.check(now);
         let drives = self.guard.drives(now);
         if drives && !step.is_hold() && self.was_online && self.has_nothing_due() {
-            self.power.pass(now);
             self.has_posted = false;
             self.follow(left, step);
             return true;
@@ -285,13 +318,6 @@ impl<M: DriveProtocol> Actuator<M> {
         self.enabling = self.enabling.saturating_sub(1);
     }
 
-    /// Offers a frame for the drive's power.
-    const fn post(&mut self, frame: Option<CanFrame>) {
-        (self.switched, self.switching) = (frame, frame);
-        self.has_posted = frame.is_some();
-        self.has_frames = true;
-    }
-
     /// Returns the command before, or rest. If rest would disable a drive on the way to be enabled, returns the frame that asks
     /// for feedback.
     fn act(&mut self, may_drive: bool) -> Option<CanFrame> {
@@ -341,7 +367,7 @@ impl<M: DriveProtocol> Actuator<M> {
     pub(super) fn stop(&mut self) {
         self.is_steady = false;
         self.relax();
-        if self.power.stop() {
+        if self.power.stop(self.guard.device.updated()) {
             self.disable();
         } else if self.offered.is_rest {
             // At rest already: a program that disarms in each tick must not keep the questions from their turn.
@@ -356,31 +382,5 @@ impl<M: DriveProtocol> Actuator<M> {
     fn rest(&mut self) -> CanFrame {
         let frame = self.motor.rest();
         if frame.is_remote() && !self.offered.is_rest { self.motor.rest() } else { frame }
-    }
-
-    fn offer(&mut self, command: Option<CanFrame>) {
-        self.withdraw();
-        let (frame, waits) = (command.or(self.offered.frame), command.is_some());
-        self.offered = Offered { frame, waits, ..Offered::NOTHING };
-        self.has_frames = true;
-    }
-
-    /// Takes back a frame still waiting for the bus.
-    pub(super) fn withdraw(&mut self) {
-        if let (true, Some(frame)) = (core::mem::take(&mut self.offered.waits), self.offered.frame)
-        {
-            self.leave_out(&frame);
-        }
-    }
-
-    fn withdraw_switching(&mut self) {
-        if let Some(frame) = self.switching.take() {
-            self.leave_out(&frame);
-        }
-    }
-
-    pub(super) fn leave_out(&mut self, frame: &CanFrame) {
-        self.superseded = self.superseded.wrapping_add(1);
-        self.motor.unsent(frame);
     }
 }

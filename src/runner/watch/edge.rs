@@ -1,7 +1,7 @@
 //! Conditions of the bus as a whole, the latch that keeps each edge until read, and the record of a command frame refused or given
 //! back by the driver.
 
-use crate::frame::CanFrame;
+use crate::frame::{CanFrame, Pattern};
 use crate::motor::{CanDevice, Claim, Devices, Visitor, take_age};
 use crate::time::{Duration, Edge, Instant};
 use core::num::NonZeroU32;
@@ -222,11 +222,11 @@ impl FrameKey {
 impl Visitor for FrameKey {
     fn visit(&mut self, device: &mut impl CanDevice) {
         let fits = |claim: &Claim| {
-            let (header, mask) = claim.pattern();
+            let Pattern { header, mask } = claim.pattern();
             !claim.is_feedback() && (self.header ^ header) & mask == 0
         };
         if let Some(claim) = device.claims().find(fits) {
-            let mask = claim.pattern().1 | !VALUES;
+            let mask = claim.pattern().mask | !VALUES;
             self.header &= mask;
             self.mask = NonZeroU32::new(mask).unwrap_or(NonZeroU32::MAX);
         }
