@@ -252,6 +252,8 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
     }
 
     /// Takes the value that `read` finds in a frame, if the frame answers the question.
+    #[cold]
+    #[inline(never)]
     pub(crate) fn hear(&mut self, read: impl FnOnce(Inquiry<R>) -> Option<f32>) {
         if let Some(asked) = self.asked
             && let Some(value) = read(asked)
