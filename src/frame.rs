@@ -345,6 +345,7 @@ impl Pattern {
 mod tests {
     use super::*;
     use std::format;
+    use std::vec::Vec;
 
     fn standard(raw: u16) -> StandardId {
         StandardId::new(raw).unwrap()
@@ -444,5 +445,26 @@ mod tests {
         assert_eq!(format!("{frame:?}"), "201 [2] 0E 16");
         let remote = CanFrame::new_remote(ExtendedId::new(0x12).unwrap(), 1).unwrap();
         assert_eq!(format!("{remote:?}"), "00000012 [1] remote request");
+    }
+
+    #[test]
+    fn a_pattern_fits_the_ids_that_have_the_bits_of_all_its_ids_in_common() {
+        let id = |raw| Id::from(StandardId::new(raw).unwrap());
+        let pattern = |raw| Pattern::of(id(raw), 0x7FF);
+        let fits = |pattern: &Pattern| -> Vec<u16> {
+            (0..0x7FF).filter(|raw| pattern.fits(&CanFrame::of(id(*raw), [0; 8]))).collect()
+        };
+        let mut two = Pattern::NONE;
+        assert!(fits(&two).is_empty());
+        two.add(pattern(0x201));
+        assert_eq!(fits(&two), [0x201]);
+        two.add(pattern(0x203));
+        assert_eq!(fits(&two), [0x201, 0x203]);
+        assert!(two.meets(&pattern(0x203)) && pattern(0x203).meets(&two));
+        assert!(!two.meets(&pattern(0x205)) && !Pattern::NONE.meets(&two));
+        assert!(Pattern::ANY.meets(&two));
+        assert_eq!(fits(&Pattern::of(id(0x201), 0x7F0)).len(), 16);
+        let remote = CanFrame::new_remote(id(0x201), 8).unwrap();
+        assert!(!two.fits(&remote) && !Pattern::NONE.fits(&remote));
     }
 }
