@@ -112,6 +112,12 @@ fn joints_ingest(joints: &mut Joints, answers: &[CanFrame; MOTORS], now: Instant
     }
 }
 
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn joints_ingest_alone(joint: &mut Actuator<Motor>, answer: &CanFrame, now: Instant) {
+    _ = Devices::ingest(joint, answer, now);
+}
+
 /// A joint without link, arming, ages, health or power: what the rules of a motor cost is the difference.
 pub struct Bare {
     measured: mit::Feedback,
@@ -179,12 +185,20 @@ fn ingest(is_shared: bool, from: u8, start: Instant) -> u32 {
     whole / MOTORS as u32
 }
 
+fn ingest_alone() -> u32 {
+    let Arm { mut joints, answers, now, .. } = Arm::new(false, true, 1, START);
+    let ([joint, ..], [Some(answer), ..]) = (&mut joints, answers) else { return u32::MAX };
+    let function = joints_ingest_alone as fn(&mut Actuator<Motor>, &CanFrame, Instant);
+    instructions(function, |ingest, _| ingest(joint, &answer, now))
+}
+
 pub fn rows() {
     row("joints_tick", &[tick(false, true)]);
     row("joints_bare", &[bare()]);
     row("joints_tick_shared", &[tick(true, true)]);
     row("joints_disarmed", &[tick(false, false)]);
     row("joints_ingest", &[ingest(false, 1, START)]);
+    row("joints_ingest_alone", &[ingest_alone()]);
     row("joints_ingest_shared", &[ingest(true, 1, START)]);
     let mut frames = [0; UP_TIMES.len()];
     for (figure, (from, start)) in frames.iter_mut().zip((1..).zip(UP_TIMES)) {
