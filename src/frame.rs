@@ -204,6 +204,16 @@ impl CanFrame {
         self.key & EXTENDED != 0
     }
 
+    /// Returns the bits on the wire with the pause after them: without stuff bits, and with the most stuff bits possible.
+    pub(crate) const fn bits(&self) -> (u32, u32) {
+        // CRC delimiter, acknowledge slot and delimiter, end of frame, and the pause of three bits.
+        const UNSTUFFED_BITS: u32 = 13;
+        let data = if self.is_remote() { 0 } else { 8 * self.length() as u32 };
+        let stuffable = data + if self.has_extended_id() { 54 } else { 34 };
+        let nominal = stuffable + UNSTUFFED_BITS;
+        (nominal, nominal + (stuffable - 1) / 4)
+    }
+
     #[inline]
     fn with_header(header: u32, data: &[u8]) -> Option<Self> {
         match data.try_into() {

@@ -64,9 +64,6 @@ impl BusLoad {
     /// Bits of a standard data frame of 8 bytes with the most stuff bits possible, with the pause after it.
     pub const WORST_CASE_BITS: u32 = Self::worst_bits(8);
 
-    /// CRC delimiter, acknowledge slot and delimiter, end of frame, and the pause of three bits.
-    const UNSTUFFED_BITS: u32 = 13;
-
     /// Returns the bits of one frame of any kind, with the pause after it: without stuff bits, and with the most stuff
     /// bits possible.
     ///
@@ -87,10 +84,7 @@ impl BusLoad {
     /// ```
     #[must_use]
     pub const fn frame_bits(frame: &CanFrame) -> (u32, u32) {
-        let data = if frame.is_remote() { 0 } else { 8 * frame.length() as u32 };
-        let stuffable = data + if frame.has_extended_id() { 54 } else { 34 };
-        let nominal = stuffable + Self::UNSTUFFED_BITS;
-        (nominal, nominal + (stuffable - 1) / 4)
+        frame.bits()
     }
 
     /// Takes the bit rate of a bus, in bits a second: 1 000 000 for DJI motors. 0 counts as 1.
@@ -141,7 +135,7 @@ impl BusLoad {
 
     /// Adds frames like this one.
     pub(super) const fn with_each(self, frame: &CanFrame, rate_hz: u32) -> Self {
-        self.with_bits(Self::frame_bits(frame), rate_hz)
+        self.with_bits(frame.bits(), rate_hz)
     }
 
     const fn with_bits(self, (nominal, worst): (u32, u32), more: u32) -> Self {

@@ -260,7 +260,7 @@ impl Meter {
     #[cold]
     #[inline(never)]
     pub(super) const fn count_other(&mut self, frame: &CanFrame) {
-        let (nominal, worst_case) = BusLoad::frame_bits(frame);
+        let (nominal, worst_case) = frame.bits();
         self.others = self.others.saturating_add(1);
         self.nominal = self.nominal.saturating_add(nominal);
         self.worst_case = self.worst_case.saturating_add(worst_case);
@@ -272,7 +272,7 @@ impl Meter {
             self.whole = self.whole.saturating_sub(1);
             return;
         }
-        let (nominal, worst_case) = BusLoad::frame_bits(frame);
+        let (nominal, worst_case) = frame.bits();
         self.others = self.others.saturating_sub(1);
         self.nominal = self.nominal.saturating_sub(nominal);
         self.worst_case = self.worst_case.saturating_sub(worst_case);
