@@ -1,5 +1,5 @@
-use super::model::{Budget, Counters, IDS, SLOTS, count, limited, name};
-use super::schedule::{self, Answers};
+use super::model::{Budget, Counters, IDS, SLOTS, limited, name};
+use super::schedule::{self, Answers, count};
 use super::slot::{Slot, health};
 use super::{AttachError, Command, Config, Joint, Joints, Register, State};
 use crate::frame::CanFrame;

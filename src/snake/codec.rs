@@ -10,6 +10,7 @@ use embedded_can::{Frame, StandardId};
 
 const WRITE: u8 = 0x01;
 const READ: u8 = 0x03;
+const REPLY: u8 = 0x04;
 
 /// A frame of the controller.
 ///
@@ -71,9 +72,19 @@ impl Command {
     }
 }
 
-const REPLY: u8 = 0x04;
-
 impl Register {
+    /// Takes the number on the wire.
+    #[must_use]
+    pub fn from_raw(raw: u8) -> Option<Self> {
+        Self::ALL.into_iter().find(|register| register.as_raw() == raw)
+    }
+
+    /// Returns the number on the wire.
+    #[must_use]
+    pub const fn as_raw(self) -> u8 {
+        self as u8
+    }
+
     /// Takes the data of a reply, and returns the register and its value as on the wire; `None` unless the data has 6 bytes, begins with 4
     /// and names a register.
     ///

@@ -93,5 +93,6 @@ mod tests;
 
 pub use codec::{Command, State};
 pub use config::{AttachError, Config};
-pub use model::{Counters, IDS, Joint, PULSES_PER_TURN, Register};
+pub use model::{Counters, IDS, PULSES_PER_TURN, Register};
 pub use schedule::Joints;
+pub use slot::Joint;

@@ -1,7 +1,6 @@
-//! Static facts of the drives, the handle of a joint, and the rates and counters of a bus.
+//! Static facts of the drives, and the rates and counters of a bus.
 
 use crate::motor::{BusLoad, MotorName};
-use core::f32::consts::TAU;
 
 pub use crate::wire::host_link::PULSES_PER_TURN;
 
@@ -79,18 +78,6 @@ impl Register {
         Self::Enable,
     ];
 
-    /// Takes the number on the wire.
-    #[must_use]
-    pub fn from_raw(raw: u8) -> Option<Self> {
-        Self::ALL.into_iter().find(|register| register.as_raw() == raw)
-    }
-
-    /// Returns the number on the wire.
-    #[must_use]
-    pub const fn as_raw(self) -> u8 {
-        self as u8
-    }
-
     /// Tells whether the register can be written.
     #[must_use]
     pub const fn is_writable(self) -> bool {
@@ -100,38 +87,6 @@ impl Register {
 
 pub(super) const fn name(id: u8) -> MotorName {
     MotorName::new("snake joint", id)
-}
-
-/// Rounds rad or rad/s to pulses; saturates, NaN gives 0.
-#[expect(clippy::cast_possible_truncation, reason = "saturates")]
-pub(super) fn to_pulses(radians: f32) -> i32 {
-    let pulses = radians * (PULSES_PER_TURN as f32 / TAU);
-    (pulses + 0.5_f32.copysign(pulses)) as i32
-}
-
-/// Names a joint of a bus: one byte, `Copy`.
-///
-/// A handle of a detached joint finds nothing, even after another joint took its place.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Joint(u8);
-
-impl Joint {
-    /// Number of joints that can follow each other in one place.
-    pub(super) const GENERATIONS: u8 = 16;
-
-    /// Index in the low half, generation in the high half.
-    pub(super) const fn new(index: u8, generation: u8) -> Self {
-        Self(generation << 4 | (index & 15))
-    }
-
-    pub(super) const fn index(self) -> usize {
-        (self.0 & 15) as usize
-    }
-
-    pub(super) const fn generation(self) -> u8 {
-        self.0 >> 4
-    }
 }
 
 /// Number of frames in an update, and the rates for the load.
@@ -208,9 +163,4 @@ impl Counters {
         packed: 0,
         superseded: 0,
     };
-}
-
-/// Counts one more; saturates.
-pub(super) const fn count(counter: &mut u32) {
-    *counter = counter.saturating_add(1);
 }

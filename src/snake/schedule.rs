@@ -1,7 +1,7 @@
 //! The joints of a bus, and their order for disables, writes and requests; outstanding replies, by id, since a reply may arrive after its
 //! joint was detached.
 
-use super::model::{Budget, Counters, IDS, SLOTS, count};
+use super::model::{Budget, Counters, IDS, SLOTS};
 use super::slot::Slot;
 use super::{Command, Register};
 use crate::frame::CanFrame;
@@ -113,6 +113,11 @@ pub(super) fn stop_again(joints: &mut Joints) {
     let stops = core::mem::take(&mut joints.returned.0);
     pack(joints, (stops & !joints.stops).count_ones());
     joints.stops |= stops;
+}
+
+/// Counts one more; saturates.
+pub(super) const fn count(counter: &mut u32) {
+    *counter = counter.saturating_add(1);
 }
 
 const fn pack(joints: &mut Joints, frames: u32) {

@@ -1,14 +1,13 @@
-//! One joint: from replies to the next frame.
+//! One joint: from replies to the next frame; its handle and its zero.
 
 pub(super) mod health;
 
-use super::config::{Offset, Settings, Stall};
-use super::model::{FASTEST, PULSES_PER_TURN, name, to_pulses};
-use super::{AttachError, Command, Config, Joint, Register, State};
-use crate::encoder::{Homing, Position};
+use super::config::{Settings, Stall};
+use super::model::{FASTEST, PULSES_PER_TURN, name};
+use super::{AttachError, Command, Config, Register};
+use crate::encoder::Homing;
 use crate::motor::{Condition, Guard, Link, MotorName, Rival, Timeouts, Traffic};
 use crate::time::{Duration, Instant};
-use crate::units::{Angle, AngularVelocity};
 use core::f32::consts::TAU;
 
 /// A relaxed joint is disabled again after this time: its drive may have missed the frame.
@@ -23,6 +22,31 @@ const TURNS: u8 = 3 * CHECKS;
 /// All registers of [`Register::SEQUENCE`], and its last register: the enable.
 const ALL: u8 = 0x7F;
 const LAST: u8 = 0x40;
+
+/// Names a joint of a bus: one byte, `Copy`.
+///
+/// A handle of a detached joint finds nothing, even after another joint took its place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Joint(u8);
+
+impl Joint {
+    /// Number of joints that can follow each other in one place.
+    pub(super) const GENERATIONS: u8 = 16;
+
+    /// Index in the low half, generation in the high half.
+    pub(super) const fn new(index: u8, generation: u8) -> Self {
+        Self(generation << 4 | (index & 15))
+    }
+
+    pub(super) const fn index(self) -> usize {
+        (self.0 & 15) as usize
+    }
+
+    pub(super) const fn generation(self) -> u8 {
+        self.0 >> 4
+    }
+}
 
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Slot {
@@ -254,34 +278,6 @@ impl Slot {
     pub(super) fn is_missing(&self, now: Instant) -> bool {
         self.id.is_some() && (self.raw.is_none() || self.guard.is_missing(now))
     }
-
-    /// Returns the state; `None` before the first position.
-    pub(super) fn state(&self) -> Option<State> {
-        let (motor, raw_pulses) = (self.name()?, self.raw?);
-        let pulses = self.directed(self.offset.shown(raw_pulses));
-        let (turns, rest) =
-            (pulses.div_euclid(PULSES_PER_TURN), pulses.rem_euclid(PULSES_PER_TURN));
-        let speed = self.directed(self.raw_speed) as f32 * (TAU / PULSES_PER_TURN as f32);
-        Some(State {
-            motor,
-            position: Position::new(
-                i64::from(turns),
-                Angle::from_turns(rest as f32 / PULSES_PER_TURN as f32),
-            ),
-            pulses,
-            raw_pulses,
-            homing: self.homing,
-            velocity: AngularVelocity::from_rad_per_s(speed),
-            link: self.guard.link(),
-            is_driven: self.driven,
-            unanswered: self.unanswered,
-            bad_replies: self.bad_replies,
-            position_jumps: self.position_jumps,
-            resets: self.resets,
-            refused_targets: self.guard.refused_targets(),
-            forgotten_targets: self.guard.forgotten_targets(),
-        })
-    }
 }
 
 impl Slot {
@@ -332,5 +328,74 @@ impl Slot {
         let bit = place.map_or(0, |place| 1 << place);
         self.pending |= bit;
         bit
+    }
+}
+
+/// Position of a joint's zero in the counts of its motor.
+///
+/// ```text
+/// position shown = raw - offset        target sent = wanted + offset
+/// ```
+/// [`Reset::Rezero`](crate::wire::host_link::Reset::Rezero) makes the present position zero. The robot's document states `offset = shown +
+/// offset`, with a doubt. `shown + offset` is the raw position, so the raw position is the new offset. All arithmetic wraps as the motor's
+/// own 32-bit counter does.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Offset(i32);
+
+impl Offset {
+    /// Takes the raw position of the zero in pulses.
+    pub(super) const fn new(raw_pulses: i32) -> Self {
+        Self(raw_pulses)
+    }
+
+    /// Returns the position from the zero, in pulses.
+    pub(super) const fn shown(self, raw_pulses: i32) -> i32 {
+        raw_pulses.wrapping_sub(self.0)
+    }
+
+    /// Returns the raw target for a wanted position from the zero, in pulses.
+    pub(super) const fn target(self, wanted_pulses: i32) -> i32 {
+        wanted_pulses.wrapping_add(self.0)
+    }
+
+    /// Returns the raw position of the zero in pulses.
+    pub(super) const fn raw(self) -> i32 {
+        self.0
+    }
+}
+
+/// Rounds rad or rad/s to pulses; saturates, NaN gives 0.
+#[expect(clippy::cast_possible_truncation, reason = "saturates")]
+pub(super) fn to_pulses(radians: f32) -> i32 {
+    let pulses = radians * (PULSES_PER_TURN as f32 / TAU);
+    (pulses + 0.5_f32.copysign(pulses)) as i32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn a_zero_is_shown_as_zero_and_moves_the_targets() {
+        let offset = Offset::new(70_000);
+        assert_eq!((offset.shown(70_000), offset.target(-1_000)), (0, 69_000));
+        assert_eq!(Offset::new(69_000).shown(70_000), 1_000);
+    }
+
+    proptest! {
+        #[test]
+        fn the_documents_sum_is_the_raw_position(first: i32, raw: i32) {
+            let sum = Offset::new(first).shown(raw).wrapping_add(first);
+            let offset = Offset::new(raw);
+            prop_assert_eq!(offset, Offset::new(sum));
+            prop_assert_eq!(offset.shown(raw), 0);
+        }
+
+        #[test]
+        fn a_target_that_is_reached_is_shown_as_wanted(zero: i32, wanted: i32) {
+            let offset = Offset::new(zero);
+            prop_assert_eq!(offset.shown(offset.target(wanted)), wanted);
+        }
     }
 }

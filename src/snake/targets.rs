@@ -1,8 +1,6 @@
 //! Targets for joints, and their settings, registers and health.
 
-use super::config::Offset;
-use super::model::to_pulses;
-use super::slot::{Slot, health};
+use super::slot::{Offset, Slot, health, to_pulses};
 use super::{AttachError, Config, Joint, Joints, PULSES_PER_TURN, Register};
 use crate::encoder::Position;
 use crate::motor::{

@@ -1,11 +1,13 @@
-//! Feedback, update and conditions of one joint.
+//! Feedback, update, conditions and state of one joint.
 
 use super::{ALL, JUMP, LAST, Slot, Standing};
-use crate::encoder::Homing;
+use crate::encoder::{Homing, Position};
 use crate::motor::{Condition, Health, Link, MotorName, Reaction};
-use crate::snake::Register;
 use crate::snake::model::{FASTEST, PULSES_PER_TURN};
+use crate::snake::{Register, State};
 use crate::time::{Duration, Edge, Instant};
+use crate::units::{Angle, AngularVelocity};
+use core::f32::consts::TAU;
 
 /// A joint that moves less than this stands.
 const STANDS: u32 = PULSES_PER_TURN.unsigned_abs() / 256;
@@ -77,6 +79,34 @@ impl Slot {
         }
         self.driven = drives;
         stops
+    }
+
+    /// Returns the state; `None` before the first position.
+    pub(in crate::snake) fn state(&self) -> Option<State> {
+        let (motor, raw_pulses) = (self.name()?, self.raw?);
+        let pulses = self.directed(self.offset.shown(raw_pulses));
+        let (turns, rest) =
+            (pulses.div_euclid(PULSES_PER_TURN), pulses.rem_euclid(PULSES_PER_TURN));
+        let speed = self.directed(self.raw_speed) as f32 * (TAU / PULSES_PER_TURN as f32);
+        Some(State {
+            motor,
+            position: Position::new(
+                i64::from(turns),
+                Angle::from_turns(rest as f32 / PULSES_PER_TURN as f32),
+            ),
+            pulses,
+            raw_pulses,
+            homing: self.homing,
+            velocity: AngularVelocity::from_rad_per_s(speed),
+            link: self.guard.link(),
+            is_driven: self.driven,
+            unanswered: self.unanswered,
+            bad_replies: self.bad_replies,
+            position_jumps: self.position_jumps,
+            resets: self.resets,
+            refused_targets: self.guard.refused_targets(),
+            forgotten_targets: self.guard.forgotten_targets(),
+        })
     }
 }
 

@@ -1,7 +1,7 @@
 //! Every `f32` that may be asked for.
 
 use crate::math::tests::every_f32;
-use crate::snake::model::to_pulses;
+use crate::snake::slot::to_pulses;
 
 #[test]
 #[ignore = "2^32 angles and speeds: by .ci/run"]
