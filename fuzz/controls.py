@@ -128,7 +128,7 @@ DEFECTS = [
     ("snake", "without a step, late, it moves on", "src/motor/safety/device.rs",
      "if repeats && !is_late", "if repeats && (!is_late || true)"),
     ("snake", "without a step no disable is sent again", "src/snake/bus.rs",
-     "self.remind();\n        schedule::stop_again(self);\n", "self.remind();\n"),
+     "}\n        schedule::stop_again(self);\n", "}\n"),
     ("snake", "without a step an answer is waited for for ever", "src/snake/bus.rs",
      "self.give_up((!(stands && is_long)).then_some(self.reply_timeout));", "_ = (stands, is_long);"),
     ("snake", "a frame given back is not counted", "src/snake/schedule.rs",

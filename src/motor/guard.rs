@@ -296,7 +296,7 @@ impl Default for Guard {
 impl Guard {
     /// Notes feedback within the [trusted](Self::trust) gap; otherwise returns `false`, and notes nothing.
     #[inline]
-    pub(super) fn hear_in_time(&mut self, now: Instant) -> bool {
+    pub(crate) fn hear_in_time(&mut self, now: Instant) -> bool {
         let now = now.stamp();
         let since_update = now.wrapping_sub(self.device.now());
         let is_in_time = self.motor.is_in_time(now) && self.motor.trusts(since_update);
@@ -307,13 +307,13 @@ impl Guard {
     }
 
     /// Trusts feedback after a shorter gap than this, once the motor was updated.
-    pub(super) fn trust(&mut self, gap_us: u32) {
+    pub(crate) fn trust(&mut self, gap_us: u32) {
         let gap_us = gap_us.min(self.device.timeouts().late_us());
         self.motor.trust(if self.device.is_running() { gap_us } else { 0 });
     }
 
     /// Returns the number of frames [in time](Self::hear_in_time) since the last call.
-    pub(super) const fn take_in_time(&mut self) -> u16 {
+    pub(crate) const fn take_in_time(&mut self) -> u16 {
         self.motor.take_in_time()
     }
 
@@ -321,15 +321,21 @@ impl Guard {
     /// nothing.
     #[inline]
     pub(super) fn goes_on(&mut self, now: Instant) -> bool {
-        let goes_on = self.device.is_quiet(self.device.updated(), now) && self.motor.drives();
+        let goes_on = self.is_quiet(now) && self.motor.drives();
         if goes_on {
             self.device.begin(now);
         }
         goes_on
     }
 
+    /// Tells whether an update at `now` has no rule to apply.
+    #[inline]
+    pub(crate) fn is_quiet(&self, now: Instant) -> bool {
+        self.device.is_quiet(self.device.updated(), now)
+    }
+
     /// Ends the quiet time here, if the quiet time lasts longer: the next update then applies the rules.
-    pub(super) fn wake_at(&mut self, time: Instant) {
+    pub(crate) fn wake_at(&mut self, time: Instant) {
         self.device.wake_at(time);
     }
 }

@@ -3,7 +3,9 @@ use super::schedule::{self, Answers, count};
 use super::slot::{Slot, health};
 use super::{AttachError, Command, Config, Joint, Joints, Register, State};
 use crate::frame::CanFrame;
-use crate::motor::{BusLoad, DeviceGuard, Hold, Ingest, Link, MotorGuard, MotorName, Timeouts};
+use crate::motor::{
+    BusLoad, DeviceGuard, Guard, Hold, Ingest, Link, MotorGuard, MotorName, Timeouts,
+};
 use crate::time::{Duration, Instant, Tick, TimeStep};
 use embedded_can::Frame;
 
@@ -175,18 +177,20 @@ impl Joints {
     pub fn update(&mut self, tick: Tick) {
         let before = self.guard.begin(tick.now());
         let has_step = !TimeStep::new(tick.dt_s(), ANY_STEP_S).is_hold();
-        if let Err(hold) = self.guard.pass::<MotorGuard>(&mut [], before, has_step, u32::MAX) {
-            return self.hold(hold);
+        let is_quiet = has_step && self.guard.is_quiet(before, tick.now());
+        if !is_quiet {
+            if let Err(hold) = self.guard.pass::<MotorGuard>(&mut [], before, has_step, u32::MAX) {
+                return self.hold(hold);
+            }
         }
         self.now = tick.now();
         self.give_up(Some(self.reply_timeout));
         for index in 0..SLOTS {
             let Some(slot) = self.slots.get_mut(index) else { continue };
-            if slot.id.is_some() && slot.update(tick.now()) {
+            if slot.id.is_some() && (slot.update(self.now) || slot.wants_reminder(self.now)) {
                 schedule::stop(self, index);
             }
         }
-        self.remind();
         schedule::plan(self);
     }
 
@@ -200,25 +204,17 @@ impl Joints {
         }
     }
 
-    /// Relaxes every joint until armed again: time did not move on, so no age is known.
-    fn lose_time(&mut self, now: Instant) {
-        for index in 0..SLOTS {
-            let Some(slot) = self.slots.get_mut(index).filter(|slot| slot.id.is_some()) else {
-                continue;
-            };
-            slot.guard.lose_time(now);
-            self.let_go(index);
-        }
-    }
-
     /// Ends an update without a step: chooses no joint, but disables joints that must rest.
     fn hold(&mut self, hold: Hold) {
         count(&mut self.counters.bad_steps);
         let now = self.guard.updated();
         match hold {
             Hold::Keep => {}
-            Hold::Rest => (0..SLOTS).for_each(|index| self.relax_at(index)),
-            Hold::LoseTime => self.lose_time(now),
+            Hold::Rest => (0..SLOTS).for_each(|index| self.rest_at(index, Guard::relax)),
+            // Time did not move on, so no age is known.
+            Hold::LoseTime => {
+                (0..SLOTS).for_each(|index| self.rest_at(index, |guard| guard.lose_time(now)));
+            }
         }
         let stands = now <= self.now;
         self.now = self.now.max(now);
@@ -226,23 +222,19 @@ impl Joints {
         let held = Duration::from_millis(self.guard.held_steps().into());
         let is_long = held > self.reply_timeout;
         self.give_up((!(stands && is_long)).then_some(self.reply_timeout));
-        self.remind();
-        schedule::stop_again(self);
-    }
-
-    fn remind(&mut self) {
         for index in 0..SLOTS {
             let slot = self.slots.get(index).filter(|slot| slot.id.is_some());
             if slot.is_some_and(|slot| slot.wants_reminder(self.now)) {
                 schedule::stop(self, index);
             }
         }
+        schedule::stop_again(self);
     }
 
-    /// Discards the target of a joint.
-    pub(super) fn relax_at(&mut self, index: usize) {
+    /// Lets a joint rest, by a change of its guard.
+    pub(super) fn rest_at(&mut self, index: usize, rest: impl FnOnce(&mut Guard)) {
         if let Some(slot) = self.slots.get_mut(index) {
-            slot.guard.relax();
+            rest(&mut slot.guard);
         }
         self.let_go(index);
     }

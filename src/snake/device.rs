@@ -121,6 +121,18 @@ impl Devices for Joints {
     fn visit(&mut self, visitor: &mut impl Visitor) {
         visitor.visit(self);
     }
+
+    fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
+        Self::ingest(self, frame, now)
+    }
+
+    fn update(&mut self, tick: Tick) {
+        Self::update(self, tick);
+    }
+
+    fn next_frame(&mut self, _turn: u32) -> Option<CanFrame> {
+        Self::next_frame(self)
+    }
 }
 
 /// Relaxes every joint.

@@ -97,7 +97,7 @@ impl Slot {
         reversed: false,
         settings: Settings::USUAL,
         guard: Guard::new(),
-        offset: Offset::new(0),
+        offset: Offset(0),
         homing: Homing::Relative,
         raw: None,
         raw_speed: 0,
@@ -236,8 +236,7 @@ impl Slot {
 
     /// Sets the speed of moves to the target; saturates.
     pub(super) fn set_speed(&mut self, rad_per_s: f32) {
-        let pulses = to_pulses(rad_per_s.abs());
-        let speed = if pulses > FASTEST { FASTEST } else { pulses };
+        let speed = to_pulses(rad_per_s.abs()).min(FASTEST);
         if speed != self.speed {
             self.speed = speed;
             self.renew(Register::Speed);
@@ -257,7 +256,7 @@ impl Slot {
     pub(super) fn zero(&mut self, now: Instant) -> bool {
         match self.raw {
             Some(raw) if self.guard.link() == Link::Online => {
-                self.set_offset(Offset::new(raw), now);
+                self.set_offset(Offset(raw), now);
                 true
             }
             _ => false,
@@ -340,14 +339,9 @@ impl Slot {
 /// offset`, with a doubt. `shown + offset` is the raw position, so the raw position is the new offset. All arithmetic wraps as the motor's
 /// own 32-bit counter does.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Offset(i32);
+pub(super) struct Offset(pub(super) i32);
 
 impl Offset {
-    /// Takes the raw position of the zero in pulses.
-    pub(super) const fn new(raw_pulses: i32) -> Self {
-        Self(raw_pulses)
-    }
-
     /// Returns the position from the zero, in pulses.
     pub(super) const fn shown(self, raw_pulses: i32) -> i32 {
         raw_pulses.wrapping_sub(self.0)
@@ -356,11 +350,6 @@ impl Offset {
     /// Returns the raw target for a wanted position from the zero, in pulses.
     pub(super) const fn target(self, wanted_pulses: i32) -> i32 {
         wanted_pulses.wrapping_add(self.0)
-    }
-
-    /// Returns the raw position of the zero in pulses.
-    pub(super) const fn raw(self) -> i32 {
-        self.0
     }
 }
 
@@ -378,23 +367,23 @@ mod tests {
 
     #[test]
     fn a_zero_is_shown_as_zero_and_moves_the_targets() {
-        let offset = Offset::new(70_000);
+        let offset = Offset(70_000);
         assert_eq!((offset.shown(70_000), offset.target(-1_000)), (0, 69_000));
-        assert_eq!(Offset::new(69_000).shown(70_000), 1_000);
+        assert_eq!(Offset(69_000).shown(70_000), 1_000);
     }
 
     proptest! {
         #[test]
         fn the_documents_sum_is_the_raw_position(first: i32, raw: i32) {
-            let sum = Offset::new(first).shown(raw).wrapping_add(first);
-            let offset = Offset::new(raw);
-            prop_assert_eq!(offset, Offset::new(sum));
+            let sum = Offset(first).shown(raw).wrapping_add(first);
+            let offset = Offset(raw);
+            prop_assert_eq!(offset, Offset(sum));
             prop_assert_eq!(offset.shown(raw), 0);
         }
 
         #[test]
         fn a_target_that_is_reached_is_shown_as_wanted(zero: i32, wanted: i32) {
-            let offset = Offset::new(zero);
+            let offset = Offset(zero);
             prop_assert_eq!(offset.shown(offset.target(wanted)), wanted);
         }
     }

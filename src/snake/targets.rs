@@ -4,7 +4,7 @@ use super::slot::{Offset, Slot, health, to_pulses};
 use super::{AttachError, Config, Joint, Joints, PULSES_PER_TURN, Register};
 use crate::encoder::Position;
 use crate::motor::{
-    Capabilities, Capability, Condition, Conditions, Health, MotorName, TargetError,
+    Capabilities, Capability, Condition, Conditions, Guard, Health, MotorName, TargetError,
 };
 use crate::time::Edge;
 use crate::units::AngularVelocity;
@@ -72,7 +72,7 @@ impl Joints {
     /// Discards the target of a joint: the joint is disabled, and stays armed.
     pub fn relax(&mut self, joint: Joint) {
         if self.slot(joint).is_some() {
-            self.relax_at(joint.index());
+            self.rest_at(joint.index(), Guard::relax);
         }
     }
 
@@ -103,7 +103,7 @@ impl Joints {
     /// The joint is detached.
     pub fn set_offset(&mut self, joint: Joint, raw_pulses: i32) -> Result<(), TargetError> {
         let now = self.now;
-        self.slot_mut(joint).ok_or(TargetError::Detached)?.set_offset(Offset::new(raw_pulses), now);
+        self.slot_mut(joint).ok_or(TargetError::Detached)?.set_offset(Offset(raw_pulses), now);
         self.relax(joint);
         Ok(())
     }
@@ -111,7 +111,7 @@ impl Joints {
     /// Returns the position of a joint's zero in the counts of its drive, in pulses, for storage. `None` for a detached joint.
     #[must_use]
     pub fn offset(&self, joint: Joint) -> Option<i32> {
-        Some(self.slot(joint)?.offset.raw())
+        Some(self.slot(joint)?.offset.0)
     }
 
     /// Requests a register of a joint once, in its turn. [`answer`](Self::answer) then returns the reply.

@@ -256,7 +256,7 @@ const OWN_NAMES: [(&str, &str, &[&str]); 26] = [
     (
         "snake",
         "the core is asked for each joint",
-        &["foreign_commands", "has_rival", "hear_rival", "hold", "lose_time", "rival"],
+        &["foreign_commands", "has_rival", "hear_rival", "hold", "rival"],
     ),
     ("snake", "times of the last position and of the last disable", &["heard", "stopped"]),
     ("snake", "a drive in an unexpected state has lost its zero", &["lose_zero"]),

@@ -118,12 +118,11 @@ pub fn tick(turns: i32, start: Instant) -> u32 {
 
 /// Returns the instructions of an answer of one joint.
 pub fn ingest(id: u8, turns: i32, start: Instant) -> u32 {
-    let Snake { mut joints, mut now, .. } = Snake::new(turns, start);
-    let mut pulses = turns * PULSES_PER_TURN;
+    let mut snake = Snake::new(turns, start);
+    let answer = reply(id, Register::ActualPosition, turns * PULSES_PER_TURN);
     instructions(snake_ingest as fn(&mut Joints, &CanFrame, Instant) -> Ingest, |ingest, _| {
-        now = now + PERIOD;
-        pulses += 3;
-        _ = ingest(&mut joints, &reply(id, Register::ActualPosition, pulses), now);
+        snake.run(1);
+        _ = ingest(&mut snake.joints, &answer, snake.now);
     })
 }
 

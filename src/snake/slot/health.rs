@@ -2,7 +2,7 @@
 
 use super::{ALL, JUMP, LAST, Slot, Standing};
 use crate::encoder::{Homing, Position};
-use crate::motor::{Condition, Health, Link, MotorName, Reaction};
+use crate::motor::{Condition, Health, Link, MotorName, Reaction, Traffic};
 use crate::snake::model::{FASTEST, PULSES_PER_TURN};
 use crate::snake::{Register, State};
 use crate::time::{Duration, Edge, Instant};
@@ -35,19 +35,26 @@ impl Slot {
     }
 
     fn receive_position(&mut self, raw: i32, now: Instant) {
+        let gap_us = now.since(self.heard).micros_u32().unwrap_or(u32::MAX);
         if let (Some(before), Link::Online | Link::Late) = (self.raw, self.guard.link()) {
             let way = raw.wrapping_sub(before).unsigned_abs();
-            let gap_ms = now.since(self.heard).micros_u32().map_or(u32::MAX, |us| us / 1_000 + 1);
-            let furthest = gap_ms.saturating_mul(2 * FASTEST.unsigned_abs() / 1_000);
+            let furthest = (gap_us / 1_000 + 1).saturating_mul(2 * FASTEST.unsigned_abs() / 1_000);
             if way > furthest.saturating_add(JUMP.unsigned_abs()) {
                 self.position_jumps = self.position_jumps.saturating_add(1);
                 self.distrust(now);
             }
         }
-        count_position(self, now);
+        if !self.guard.hear_in_time(now) {
+            match self.raw {
+                Some(_) => self.traffic.gap(gap_us),
+                None => self.window_from = now,
+            }
+            self.traffic.count();
+            self.guard.hear(now);
+            self.guard.trust(self.traffic.usual_gap_us());
+        }
         self.raw = Some(raw);
         self.heard = now;
-        self.guard.hear(now);
     }
 
     /// Handles a drive in an unexpected state: its zero may differ, so the joint stays relaxed until armed again.
@@ -66,11 +73,12 @@ impl Slot {
 
     /// Brings the joint to `now`. Returns whether the joint must be disabled.
     pub(in crate::snake) fn update(&mut self, now: Instant) -> bool {
+        let is_quiet = self.guard.is_quiet(now) && self.guard.link() == Link::Online;
         let drives = self.guard.drives(now);
-        if self.guard.link() == Link::Offline {
-            self.lose_zero(now);
+        let is_stalled = is_stalled(self, now);
+        if is_stalled || !is_quiet {
+            check(self, is_stalled, now);
         }
-        check(self, now);
         // The check may have relaxed the joint.
         let drives = drives && self.guard.is_armed();
         let stops = self.driven && !drives;
@@ -110,53 +118,50 @@ impl Slot {
     }
 }
 
-/// Counts a position received at `now`, before its time replaces the previous time.
-fn count_position(slot: &mut Slot, now: Instant) {
-    if slot.raw.is_some() {
-        let gap = now.since(slot.heard).micros_u32();
-        slot.traffic.gap(gap.unwrap_or(u32::MAX));
-    } else {
-        slot.window_from = now;
-    }
-    slot.traffic.count();
-}
-
 /// Notes a write or a request of another node.
 pub(in crate::snake) fn hear_rival(slot: &mut Slot, now: Instant) {
     slot.rival.hear(now);
     slot.guard.note(Condition::SecondMaster, true, now);
+    slot.guard.wake_at(now);
 }
 
 pub(in crate::snake) const fn has_rival(slot: &Slot) -> bool {
     slot.rival.is_present()
 }
 
-/// Ends expired conditions, and the window in which positions are counted.
-fn check(slot: &mut Slot, now: Instant) {
-    slot.rival.check(now);
-    slot.guard.note(Condition::SecondMaster, has_rival(slot), now);
-    check_stall(slot, now);
-    if slot.raw.is_some() {
-        slot.traffic.end_window(&mut slot.window_from, now);
+/// Begins and ends conditions, and ends the window in which positions are counted. The next check is due at the end of the window, and
+/// during a condition with the next update.
+fn check(slot: &mut Slot, is_stalled: bool, now: Instant) {
+    if slot.guard.link() == Link::Offline {
+        slot.lose_zero(now);
     }
+    if has_rival(slot) {
+        slot.rival.check(now);
+        slot.guard.note(Condition::SecondMaster, has_rival(slot), now);
+    }
+    if is_stalled && slot.stall.reaction == Reaction::Relax {
+        slot.guard.relax_until_armed();
+    }
+    slot.guard.note(Condition::Stalled, is_stalled, now);
+    slot.traffic.add(slot.guard.take_in_time());
+    if slot.traffic.end_window(&mut slot.window_from, now) {
+        slot.guard.trust(0);
+    }
+    let is_well = !is_stalled && !has_rival(slot);
+    slot.guard.wake_at(if is_well { slot.window_from + Traffic::WINDOW } else { now });
 }
 
-/// Checks a joint away from its target: without a motion, the joint is blocked, or its drive does not follow.
-fn check_stall(slot: &mut Slot, now: Instant) {
-    let Some(raw) = slot.raw else { return };
-    let (window, reaction) = (slot.stall.window, slot.stall.reaction);
+/// Tells whether a joint away from its target stands for too long: the joint is blocked, or its drive does not follow.
+fn is_stalled(slot: &mut Slot, now: Instant) -> bool {
+    let Some(raw) = slot.raw else { return false };
     let way = slot.target.wrapping_sub(raw).unsigned_abs();
     let moved = raw.wrapping_sub(slot.stands.at).unsigned_abs() > STANDS;
     let asked = is_up(slot) && way > THERE;
-    let is_watched = reaction != Reaction::Ignore && slot.guard.link() == Link::Online;
+    let is_watched = slot.stall.reaction != Reaction::Ignore && slot.guard.link() == Link::Online;
     if moved || !(asked && is_watched && is_fast_enough(slot)) {
         slot.stands = Standing { at: raw, since: now };
     }
-    let begins = now.since(slot.stands.since) >= window;
-    if begins && reaction == Reaction::Relax {
-        slot.guard.relax_until_armed();
-    }
-    slot.guard.note(Condition::Stalled, begins, now);
+    now.since(slot.stands.since) >= slot.stall.window
 }
 
 /// Tells whether the joint was enabled. Before, the drive reports itself as disabled. Afterwards, there may be changed values all the time,
@@ -178,8 +183,7 @@ pub(in crate::snake) fn next_edge_at(slot: &Slot) -> Option<Instant> {
 }
 
 pub(in crate::snake) fn next_edge(slot: &mut Slot) -> Option<Edge<Condition, MotorName>> {
-    let motor = slot.name()?;
-    slot.guard.next_edge(motor)
+    slot.guard.next_edge(slot.name()?)
 }
 
 /// Returns the health of the joint.

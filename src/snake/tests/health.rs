@@ -125,6 +125,21 @@ fn another_controller_is_an_edge_and_refuses_arming_for_a_second() {
 }
 
 #[test]
+fn another_controller_counts_for_a_second_wherever_a_driven_joint_is_between_two_checks() {
+    let mut bench = Bench::armed(&[1]);
+    let is_present =
+        |bench: &Bench| bench.joints.conditions(bench.handles[0]).contains(Condition::SecondMaster);
+    for wait_ms in 1..45 {
+        bench.drive(wait_ms);
+        _ = bench.joints.ingest(&frame(1, &[3, 7]), at_ms(bench.ms));
+        bench.drive(1_000);
+        assert!(is_present(&bench), "{wait_ms}");
+        bench.drive(1);
+        assert!(!is_present(&bench) && bench.state(0).is_driven, "{wait_ms}");
+    }
+}
+
+#[test]
 fn own_frames_that_the_driver_hands_back_are_no_other_controllers() {
     let mut bench = Bench::new(&[3]);
     bench.joints = bench.joints.with_loopback();
@@ -157,6 +172,19 @@ fn health_is_a_line_with_rate_and_longest_gap() {
     assert!(health.to_string().starts_with("snake joint #1: online, armed, healthy; 5"));
     bench.joints.detach(bench.handles[0]);
     assert_eq!(bench.joints.health(bench.handles[0]), None);
+}
+
+#[test]
+fn a_pause_of_a_driven_joint_that_is_not_late_yet_is_its_longest_gap() {
+    let mut bench = Bench::armed(&[1]);
+    bench.drive(100);
+    bench.silent = std::vec![1];
+    bench.drive(20);
+    bench.silent.clear();
+    bench.drive(100);
+    let health = bench.joints.health(bench.handles[0]).unwrap();
+    assert!((20_000..=24_000).contains(&health.longest_gap.as_micros()), "{health}");
+    assert_eq!(edges(&mut bench.joints), []);
 }
 
 /// A joint with a stall window of 300 ms, at 10 rpm; it moves to its target as long as it is not blocked.
@@ -205,6 +233,27 @@ fn a_blocked_joint_is_stalled_in_either_direction_and_relaxed_where_configured()
         assert_eq!(bench.joints.set_pulses(bench.handles[0], 0), Err(TargetError::Relaxed));
         assert_eq!(bench.joints.arm(at_ms(bench.ms)), Ok(()));
     }
+}
+
+#[test]
+fn a_joint_is_stalled_from_the_update_in_which_it_stood_for_its_window_to_the_one_in_which_it_moved()
+ {
+    let mut bench = jaw(Reaction::Report);
+    assert_eq!(run_to(&mut bench, 0, 100, false), []);
+    let (mut at, mut since, mut stalls) = (bench.raw[0], bench.ms, 0);
+    for step in 0..20_000 {
+        // Blocked for 279 ms to 355 ms, and free for 40 ms.
+        let length = 40 + 279 + step / 1_000 * 4;
+        let (raw, is_free) = (bench.state(0).raw_pulses, step % length < 40);
+        run_to(&mut bench, 10_000_000, 1, !is_free);
+        if (raw - at).abs() > 256 {
+            (at, since) = (raw, bench.ms);
+        }
+        let is_stalled = bench.joints.conditions(bench.handles[0]).contains(Condition::Stalled);
+        assert_eq!(is_stalled, bench.ms - since >= 300, "{step}");
+        stalls += u32::from(is_stalled && bench.ms - since == 300);
+    }
+    assert!(stalls > 30, "{stalls}");
 }
 
 #[test]
