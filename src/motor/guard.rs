@@ -2,7 +2,7 @@
 
 use super::age;
 use super::safety::{DeviceGuard, MotorGuard, OPENING};
-use crate::motor::{Condition, Link, TargetError, Timeouts};
+use crate::motor::{Link, TargetError, Timeouts};
 use crate::time::{Duration, Instant};
 
 /// Decides whether one motor may be driven: for motors outside the families of this crate.
@@ -162,7 +162,7 @@ impl Guard {
     /// Tells whether the time of the last update moved on. If not, the length of nothing that lasts until now is known.
     #[cfg(feature = "hal")]
     pub(crate) const fn knows_time(&self) -> bool {
-        !self.motor.latch().has(Condition::ClockFault)
+        !self.motor.latch().has(super::Condition::ClockFault)
     }
 
     /// Handles a time that did not move on, so that no age is known. Feedback counts as late until the next frame, and the motor trips.
