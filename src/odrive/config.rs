@@ -9,9 +9,9 @@ use crate::units::AngularVelocity;
 
 /// A motor of this family in a control mode: see the [module](super).
 ///
-/// Costs 4264 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
+/// Costs 4177 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
 ///
-/// Costs 103 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
+/// Costs 90 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
 ///
 /// # Examples
 /// ```
