@@ -4,7 +4,7 @@
 
 use drivetrain::encoder::Position;
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{ArmError, Devices, Link, TargetError};
+use drivetrain::motor::{ArmError, Condition, Devices, Link, TargetError};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{Controller, Fault, Line, MotorKey, Sender, Simulation};
 use drivetrain::snake::{Command, Config, Joint, Joints, Register};
@@ -207,6 +207,50 @@ fn a_brown_out_shorter_than_any_time_limit_does_not_set_a_joint_going_again() {
     let state = robot.runner.device().state(robot.joints[6]).unwrap();
     assert!(state.resets + state.position_jumps >= 1, "{state:?}");
     assert!(!robot.is_enabled(6) && !state.is_driven && !robot.runner.is_armed());
+}
+
+/// Takes the supply of a joint that stands so many degrees from where its drive began to count. Returns whether the zero counts as lost, and
+/// how far in rad the joint goes on when it is told the same again.
+fn lose_supply(degrees: f32, loss_ms: u64, is_driven: bool) -> (bool, f32) {
+    let world = Simulation::new(4);
+    let mut robot = Robot::of(&world, [(1, Some(0))].into_iter(), Joints::new());
+    robot.run(50);
+    robot.arm();
+    robot.wanted = Some(degrees);
+    robot.run(2_000);
+    let key = robot.keys[0];
+    let shaft = || world.motor(key).unwrap().position.as_turns();
+    let before = shaft();
+    assert!((before * 360.0 - degrees).abs() < 1.0, "{before}");
+    if !is_driven {
+        robot.wanted = None;
+        robot.runner.device_mut().disarm();
+        robot.run(500);
+    }
+    let window = world.now()..world.now() + Duration::from_millis(loss_ms);
+    let fault = Fault::PowerLoss { motor: key, forgets_angle: true };
+    world.fault(fault, window).unwrap();
+    robot.run(500);
+    let edges = std::iter::from_fn(|| Devices::next_edge(robot.runner.device_mut()));
+    let is_told = edges.into_iter().any(|edge| edge.condition == Condition::PositionUncertain);
+    robot.run(2_000);
+    (is_told, (shaft() - before).abs() * std::f32::consts::TAU)
+}
+
+/// The zero is lost where the drive counts from another angle: a joint at rest cannot have turned by so much. What is within 0.4 rad, and
+/// 8 rad/s times the time without a position, is not told from a joint that was turned.
+#[test]
+fn a_joint_whose_drive_counts_anew_after_a_short_loss_of_supply_is_not_driven_away() {
+    for degrees in [6.0_f32, 17.0, 60.0, 172.0] {
+        for loss_ms in [5, 20, 35, 50, 90, 150] {
+            let most = 0.4 + 8.0e-3 * (loss_ms as f32 + 15.0);
+            let (is_told, way) = lose_supply(degrees, loss_ms, true);
+            assert!(way < if is_told { 0.1 } else { most }, "{degrees}, {loss_ms}: {way} rad");
+            let (is_told, way) = lose_supply(degrees, loss_ms, false);
+            assert!(is_told || degrees.to_radians() < most, "{degrees}, {loss_ms}");
+            assert!(way < 0.1, "disarmed");
+        }
+    }
 }
 
 /// What disarms joint 1, how it is counted (resets and jumps), and how often the request to arm has to be released.

@@ -59,6 +59,8 @@ pub(super) struct Slot {
     homing: Homing,
     raw: Option<i32>,
     raw_speed: i32,
+    /// In pulses a second, by the last two positions.
+    rate: f32,
     heard: Instant,
     /// Target and speed, as on the wire.
     target: i32,
@@ -101,6 +103,7 @@ impl Slot {
         homing: Homing::Relative,
         raw: None,
         raw_speed: 0,
+        rate: 0.0,
         heard: Instant::START,
         target: 0,
         speed: 0,

@@ -3,11 +3,18 @@
 use super::{ALL, JUMP, LAST, Slot, Standing};
 use crate::encoder::{Homing, Position};
 use crate::motor::{Condition, Health, Link, MotorName, Reaction, Traffic};
-use crate::snake::model::{FASTEST, PULSES_PER_TURN};
+use crate::snake::model::PULSES_PER_TURN;
 use crate::snake::{Register, State};
 use crate::time::{Duration, Edge, Instant};
 use crate::units::{Angle, AngularVelocity};
 use core::f32::consts::TAU;
+
+/// A position may have waited for so long, in s; two that waited come at once.
+const WAITED_S: f32 = 0.04;
+const SOONEST_S: f32 = 0.001;
+
+/// 8 rad/s in pulses a second.
+const SPED_UP: f32 = 8.0 * PULSES_PER_TURN as f32 / TAU;
 
 /// A joint that moves less than this stands.
 const STANDS: u32 = PULSES_PER_TURN.unsigned_abs() / 256;
@@ -37,12 +44,13 @@ impl Slot {
     fn receive_position(&mut self, raw: i32, now: Instant) {
         let gap_us = now.since(self.heard).micros_u32().unwrap_or(u32::MAX);
         if let (Some(before), Link::Online | Link::Late) = (self.raw, self.guard.link()) {
-            let way = raw.wrapping_sub(before).unsigned_abs();
-            let furthest = (gap_us / 1_000 + 1).saturating_mul(2 * FASTEST.unsigned_abs() / 1_000);
-            if way > furthest.saturating_add(JUMP.unsigned_abs()) {
+            let (way, gap_s) =
+                (raw.wrapping_sub(before).unsigned_abs() as f32, gap_us as f32 * 1e-6);
+            if way > furthest(self, before, gap_s) {
                 self.position_jumps = self.position_jumps.saturating_add(1);
                 self.distrust(now);
             }
+            self.rate = way / gap_s.max(SOONEST_S);
         }
         if !self.guard.hear_in_time(now) {
             match self.raw {
@@ -116,6 +124,15 @@ impl Slot {
             forgotten_targets: self.guard.forgotten_targets(),
         })
     }
+}
+
+/// Returns the largest way in pulses of a joint from a position, in a time since the position was heard: a little, and the larger of the
+/// way at its last rate and, if armed, the way to its target; beside that, 8 rad/s for a joint that sped up meanwhile.
+fn furthest(slot: &Slot, before: i32, gap_s: f32) -> f32 {
+    let time_s = gap_s.max(WAITED_S);
+    let to_target = slot.target.wrapping_sub(before).unsigned_abs() as f32;
+    let asked = if slot.guard.is_armed() { to_target.min(slot.speed as f32 * time_s) } else { 0.0 };
+    JUMP as f32 + SPED_UP * gap_s + asked.max(1.5 * slot.rate * time_s)
 }
 
 /// Notes a write or a request of another node.
