@@ -736,6 +736,26 @@ fn a_target_that_the_motor_does_not_offer_changes_nothing() {
     assert_eq!((bench.own.velocity(()), bench.own.angle(())), (None, None), "late");
 }
 
+/// The motor once took torques without end where its drive had left the mode for torques.
+#[test]
+fn a_motor_that_takes_the_kind_of_its_target_no_longer_rests_and_refuses_the_next() {
+    let mut bench = Bench::armed(Tool::PLAIN, Report::None);
+    for ms in 0..300 {
+        bench.ms += 1;
+        bench.hear();
+        if ms == 250 {
+            bench.own.motor_mut().offers = Capabilities::of(&[Capability::Velocity]);
+        }
+        let set = bench.own.set_torque(1.0);
+        assert_eq!(set, if ms > 250 { Err(TargetError::Unsupported) } else { Ok(()) }, "{ms}");
+        let tick = bench.tick();
+        bench.own.update(tick);
+        let torque = 1.0_f32.to_le_bytes();
+        let is_driven = bench.drain().iter().any(|frame| frame.bytes()[..4] == torque);
+        assert_eq!(is_driven, ms < 250, "{ms}");
+    }
+}
+
 /// The share opens after arming and falls with heat; the smaller one counts.
 #[test]
 fn the_share_is_that_of_the_opening_or_that_of_the_heat() {

@@ -65,6 +65,8 @@ pub struct Actuator<M> {
     share: f32,
     /// In the direction of the drive, as all below.
     target: Target,
+    /// The kind of the target, among the capabilities of the motor when it was set.
+    kind: Capability,
     offered: Offered,
     /// The last frame taken, but for the drive's power.
     last: Option<CanFrame>,
@@ -104,6 +106,7 @@ impl<M: DriveProtocol> Actuator<M> {
             watch: Watch::new(),
             power: Power::NEW,
             target: Target::Torque(0.0),
+            kind: Capability::Torque,
             is_narrowed: false,
             goal: Target::Torque(0.0),
             share: 0.0,
@@ -258,6 +261,7 @@ impl<M: DriveProtocol> Actuator<M> {
     #[must_use]
     pub const fn motor_mut(&mut self) -> &mut M {
         self.route = Route::UNKNOWN;
+        self.is_steady = false;
         &mut self.motor
     }
 

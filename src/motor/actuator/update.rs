@@ -137,6 +137,7 @@ impl<M: DriveProtocol> Actuator<M> {
             if !self.motor.capabilities().has(kind) {
                 return Err(TargetError::Unsupported);
             }
+            self.kind = kind;
             // Where there was no target, the command is of one before.
             self.offered.may_repeat.end_without(self.guard.has_target());
         }
@@ -160,6 +161,9 @@ impl<M: DriveProtocol> Actuator<M> {
     #[inline(never)]
     pub(super) fn decide(&mut self, step: TimeStep, now: Instant) -> bool {
         self.is_steady = false;
+        if self.guard.has_target() && !self.motor.capabilities().has(self.kind) {
+            self.guard.relax();
+        }
         self.place_zero();
         let left = self.check(now);
         let drives = self.guard.drives(now);
