@@ -71,12 +71,7 @@ impl Watch {
         self.traffic.usual_gap_us()
     }
 
-    /// Tells whether nothing but the [next](Self::next) check of slow quantities is due, as far as no condition holds.
-    pub(crate) const fn is_well(&self) -> bool {
-        self.error_code == 0 && !self.rival.is_present()
-    }
-
-    /// Returns the time of the next check of slow quantities.
+    /// Returns the time of the next check of slow quantities: until then, a motor without a condition needs none.
     pub(crate) const fn next(&self) -> Instant {
         self.next
     }
@@ -114,10 +109,8 @@ impl Watch {
             // The clock went back.
             (self.checked, self.next) = (now, now + PERIOD);
         }
-        let Vitals { has_fault, has_warning, error_code, .. } = vitals();
-        let is_well = !(has_fault || has_warning)
-            && error_code == self.error_code
-            && !self.rival.is_present()
+        let Vitals { has_fault, has_warning, .. } = vitals();
+        let is_well = !(has_fault || has_warning || self.rival.is_present())
             && guard.link() == Link::Online
             && guard.conditions().is_empty();
         if is_well && now < self.next {

@@ -28,7 +28,8 @@ impl<M: DriveProtocol> Actuator<M> {
         outcome
     }
 
-    /// Takes feedback that comes later than usual, or reports another state of the drive.
+    /// Takes feedback that comes later than usual, or reports another state of the drive. After a silence, unless feedback is late only
+    /// after more, the drive may have started again, or be another one.
     #[cold]
     #[inline(never)]
     fn hear(&mut self, is_usual: bool, now: Instant) {
@@ -41,25 +42,22 @@ impl<M: DriveProtocol> Actuator<M> {
             self.motor.forget_settings();
         }
         let gap_us = gap_us.unwrap_or(0);
-        if gap_us > SILENCE_US || self.joint.depends_on_supply() {
-            self.doubt(gap_us, now);
+        let is_silence = gap_us > SILENCE_US && self.guard.is_late_by(gap_us);
+        if is_silence {
+            self.motor.forget_settings();
+        }
+        if self.joint.depends_on_supply() {
+            self.doubt(gap_us, is_silence, now);
         }
         let is_trusted = !self.joint.depends_on_supply();
         self.guard.trust(if is_trusted { self.watch.usual_gap_us().min(SILENCE_US) } else { 0 });
     }
 
-    /// Asks whether the drive started again: in a silence, unless feedback is late only after more, or before an angle that jumped. The
-    /// joint stays where it is, with its target; without its zero, it trips.
+    /// Asks whether the drive of a joint started again: in a silence, or before an angle that jumped. The joint stays where it is, with
+    /// its target; without its zero, it trips.
     #[cold]
     #[inline(never)]
-    fn doubt(&mut self, gap_us: u32, now: Instant) {
-        let is_silence = gap_us > SILENCE_US && self.guard.is_late_by(gap_us);
-        if is_silence {
-            self.motor.forget_settings();
-        }
-        if !self.joint.depends_on_supply() {
-            return;
-        }
+    fn doubt(&mut self, gap_us: u32, is_silence: bool, now: Instant) {
         let (velocity, at) = (self.motor.velocity(), now.stamp());
         let reading = self.motor.angle().map(|angle| Reading { angle, velocity, at });
         match self.joint.follow(reading, at, gap_us, is_silence) {
@@ -151,8 +149,8 @@ impl<M: DriveProtocol> Actuator<M> {
     /// Moves on to a tick in which the rules have nothing to change; otherwise returns `false`, and moves nothing.
     #[inline]
     pub(super) fn goes_on(&mut self, now: Instant) -> bool {
-        let Vitals { has_fault, has_warning, error_code, .. } = self.motor.vitals();
-        !has_fault && !has_warning && error_code == 0 && self.guard.goes_on(now)
+        let Vitals { has_fault, has_warning, .. } = self.motor.vitals();
+        !has_fault && !has_warning && self.guard.goes_on(now)
     }
 
     /// Applies all rules: enables, disables, asks and rests, as the motor may be driven or not. Returns whether a command is due, of the goal
@@ -194,7 +192,6 @@ impl<M: DriveProtocol> Actuator<M> {
         let has_other = self.has_posted || inquiry.is_some();
         let gives_way = is_at_rest && self.offered.is_rest && has_other;
         self.offer(if gives_way { inquiry } else { command });
-        self.offered.may_repeat = Repeat::after_update(!is_at_rest, step.is_hold());
         let is_rest = |frame: CanFrame| is_at_rest && !gives_way && !frame.is_remote();
         self.offered.is_rest = command.is_some_and(is_rest);
         false
@@ -217,7 +214,8 @@ impl<M: DriveProtocol> Actuator<M> {
             return;
         }
         self.share = left;
-        let is_well = self.watch.is_well() && self.guard.conditions().is_empty();
+        // An error and a second master are conditions too, unless ignored.
+        let is_well = self.guard.conditions().is_empty();
         self.is_steady = is_well && self.has_nothing_due() && !self.joint.awaits_zero();
         self.guard.wake_at(self.watch.next());
     }

@@ -61,11 +61,6 @@ impl Repeat {
     /// The last update gave a command.
     pub(crate) const ONCE: Self = Self(true);
 
-    /// After an update, which drove the motor or not, with a usable step or without.
-    pub(crate) const fn after_update(drove: bool, is_hold: bool) -> Self {
-        Self(drove && !is_hold)
-    }
-
     /// Tells whether an update may give a command: with a usable step, or once without.
     pub(crate) const fn admits(self, is_hold: bool) -> bool {
         !is_hold || self.0
@@ -75,7 +70,7 @@ impl Repeat {
     #[cfg(feature = "hal")]
     pub(crate) const fn drives(&mut self, may_drive: bool, is_hold: bool) -> bool {
         let drives = may_drive && self.admits(is_hold);
-        *self = Self::after_update(drives, is_hold);
+        *self = Self(drives && !is_hold);
         drives
     }
 
