@@ -522,6 +522,14 @@ fn a_drive_that_was_late_tells_its_setting_again_before_it_is_armed() {
     bench.idle();
     assert_eq!(bench.own.ingest(&answer(), bench.now()), Ingest::Taken);
     bench.arm();
+    // The program stood still, so no update found the drive late: only after 100 ms without feedback it may be another one.
+    for (gap_ms, is_known) in [(100, true), (101, false)] {
+        bench.ms += gap_ms;
+        bench.hear();
+        assert_eq!(bench.own.motor().wrong_setting().is_none(), is_known, "{gap_ms} ms");
+        assert_eq!(bench.own.ingest(&answer(), bench.now()), Ingest::Taken);
+        bench.idle();
+    }
 }
 
 #[test]
@@ -920,6 +928,23 @@ fn an_update_without_a_step_holds_no_command_from_before_a_rest() {
         assert_eq!(sent(0.001), [driven]);
         assert_eq!([0.0, 0.0].map(&mut sent), [[driven], [none]], "once");
     }
+}
+
+/// A frame is due in the 11th update, which has no step.
+#[test]
+fn an_update_without_a_step_enables_no_drive() {
+    let mut bench = Bench::armed(Tool::POWERED, Report::Always(false));
+    let mut cycle = 0;
+    let sent = power(1..=25, || {
+        cycle += 1;
+        bench.ms += 1;
+        bench.hear();
+        bench.own.set_torque(2.0).unwrap();
+        let tick = Tick::new(bench.now(), if cycle == 11 { 0.0 } else { 0.001 });
+        bench.own.update(tick);
+        bench.drain()
+    });
+    assert_eq!(sent, [(1, 1), (12, 1), (22, 1)]);
 }
 
 #[test]

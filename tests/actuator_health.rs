@@ -165,6 +165,70 @@ fn a_fault_relaxes_until_it_is_gone_and_armed_and_a_warning_does_not() {
     assert_eq!(edges, [(Condition::Fault, true), (Condition::Fault, false)]);
 }
 
+/// In the update that sees the code, and once for each code of a severity.
+#[test]
+fn an_error_is_an_edge_as_its_code_changes_and_one_without_a_code_counts_too() {
+    use Condition::{Fault, Warning};
+    let mut bench = Bench::new(&USUAL);
+    for _ in 0..20 {
+        bench.step([30, 0, 0, 0]);
+    }
+    for (number, (code, drives, expected)) in [
+        (3, true, &[(Warning, true)][..]),
+        (3, true, &[]),
+        (4, true, &[(Warning, true)]),
+        (4, true, &[]),
+        (10, false, &[(Warning, false), (Fault, true)]),
+        (10, false, &[]),
+        (11, false, &[(Fault, true)]),
+        (11, false, &[]),
+        (0, false, &[(Fault, false)]),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        assert_eq!(bench.step([30, code, 0, 0]), drives, "{number}");
+        let edges = bench.edges();
+        assert_eq!(edges.len(), expected.len(), "{number}: {edges:?}");
+        assert!(expected.iter().all(|edge| edges.contains(edge)), "{number}: {edges:?}");
+    }
+    let error_code = 5;
+    for (vitals, drives, expected) in [
+        (Vitals { error_code, ..Vitals::default() }, true, &[][..]),
+        (Vitals { has_warning: true, ..Vitals::default() }, true, &[(Warning, true)]),
+        (Vitals { has_fault: true, ..Vitals::default() }, false, &[(Fault, true)]),
+    ] {
+        let mut bench = Bench::new(&USUAL);
+        for _ in 0..20 {
+            assert!(bench.step([30, 0, 0, 0]));
+        }
+        bench.own.motor().instead.set(Some(vitals));
+        assert_eq!(bench.step([30, 0, 0, 0]), drives, "{vitals:?}");
+        assert_eq!(bench.edges(), expected, "{vitals:?}");
+        assert_eq!(bench.own.health().error_code, vitals.error_code);
+    }
+}
+
+/// 80 ms have ten checks, one each 8 ms. A motor at half of its speed does not stall.
+#[test]
+fn a_check_that_finds_an_armed_motor_at_its_limit_is_counted() {
+    let mut bench = Bench::new(&USUAL);
+    let mut counted = |code, effort: i8, speed: i8, disarms: bool| {
+        if disarms {
+            bench.own.disarm();
+        }
+        for _ in 0..80 {
+            bench.step([30, code, effort.cast_unsigned(), speed.cast_unsigned()]);
+        }
+        bench.own.health().saturated
+    };
+    assert_eq!(counted(0, 99, 50, false), 0);
+    assert_eq!(counted(0, 100, 50, false), 10);
+    assert_eq!(counted(0, -120, -50, false), 20);
+    assert_eq!(counted(3, 100, 50, false), 30, "also while a condition holds");
+    assert_eq!(counted(0, 100, 50, true), 30);
+}
+
 #[test]
 fn a_stall_is_reported_or_relaxes() {
     static RELAX: HealthConfig =

@@ -291,8 +291,9 @@ tuple!(A 0, B 1, C 2, D 3);
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::damiao::{Model, Motor};
     use crate::dji::{Bus, Config, Gm6020Voltage, M2006, M3508};
-    use crate::motor::ArmError;
+    use crate::motor::{Actuator, ArmError, ImpedanceControl};
     use std::vec::Vec;
 
     fn bus<M: crate::dji::Model>(id: u8) -> Bus {
@@ -323,6 +324,21 @@ mod tests {
         assert_eq!(hear(&mut both, 0x205, at(1)), Ingest::Unrelated);
         assert!(both.requeue(&CanFrame::standard(0x2FF, [0; 8]).unwrap()));
         assert!(!both.requeue(&CanFrame::standard(0x1FE, [0; 8]).unwrap()));
+    }
+
+    /// By one look at its id; one for none of them is offered to each, from the first on.
+    #[test]
+    fn an_array_of_drives_asks_first_the_one_that_a_frame_is_for() {
+        let gains = ImpedanceControl::new(3.0).unwrap();
+        let mut drives =
+            [1, 2, 3].map(|id| Actuator::new(Motor::new(Model::J4310, id, gains).unwrap()));
+        for id in [0x11, 0x12, 0x13] {
+            // Enabled, and the id again.
+            let frame = CanFrame::standard(id.into(), [id, 0, 0, 0, 0, 0, 0, 0]).unwrap();
+            assert_eq!(drives.ingest(&frame, at(1)), Ingest::Taken);
+        }
+        let place = |id| place_of(&drives, CanFrame::standard(id, [0; 8]).unwrap().header());
+        assert_eq!([0x11, 0x12, 0x13, 0x14, 0x01].map(place), [0, 1, 2, 0, 0]);
     }
 
     #[test]

@@ -326,3 +326,16 @@ impl Guard {
         Some(journal.first_time(now).unwrap_or_else(|| journal.last_time(now)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vitals_have_the_first_code_of_a_fault_or_the_code_of_a_warning() {
+        let of = |vitals: Vitals| (vitals.has_fault, vitals.has_warning, vitals.error_code);
+        assert_eq!(of(Vitals::of_errors([0, 7, 9], 3)), (true, false, 7));
+        assert_eq!(of(Vitals::of_errors([0, 0], 3)), (false, true, 3));
+        assert_eq!(of(Vitals::of_errors([0, 0], 0)), (false, false, 0));
+    }
+}

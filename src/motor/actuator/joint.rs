@@ -567,6 +567,21 @@ mod tests {
         }
     }
 
+    /// A quarter of a radian further outward at once, the way is anew from where the shaft is.
+    #[test]
+    fn a_shaft_that_was_turned_further_is_not_pulled_back() {
+        for (here, expected) in [(2.2, 2.0), (2.25, 2.25), (2.3, 2.3)] {
+            let (mut start, step) = (Start::NONE, Some(0.1));
+            let mut goal = |here: f32| {
+                let shaft = (Some(Angle::from_radians(here)), AngularVelocity::ZERO);
+                let still = Target::Velocity(AngularVelocity::ZERO);
+                start.goal(still, 1.0, shaft, Some(inside(here, 0.0)), step)
+            };
+            goal(2.0);
+            assert_eq!(goal(here), Target::Angle(Angle::from_radians(expected)));
+        }
+    }
+
     /// 1400 rad/s² at most, with feedback that is a step old.
     #[test]
     fn a_light_joint_comes_to_rest_at_a_limit() {
