@@ -240,7 +240,8 @@ impl<H: Copy, D: AngleDrive<H>, const N: usize> AngleDrive<(usize, H)> for [D; N
 pub enum TargetError {
     /// The owner has no motor with this handle, for example after a detach.
     Detached,
-    /// The target is NaN or infinite. The motor goes to its safe output in the next update, unless a good target comes before.
+    /// The target is NaN or infinite, or its stiffness or damping below zero. The motor goes to its safe output in the next update, unless a
+    /// good target comes before.
     NotFinite,
     /// The device is not armed.
     Disarmed,
@@ -262,7 +263,7 @@ impl core::fmt::Display for TargetError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
             Self::Detached => "the motor was detached",
-            Self::NotFinite => "the target is NaN or infinite",
+            Self::NotFinite => "not finite, or a gain below 0",
             Self::Disarmed => "the device is not armed",
             Self::NoFeedback => "no fresh feedback from the motor",
             Self::Relaxed => "the motor was relaxed by a fault: arm it again",

@@ -2,6 +2,7 @@
 
 use super::{ALL, JUMP, LAST, Slot, Standing};
 use crate::encoder::{Homing, Position};
+use crate::math::limited;
 use crate::motor::{Condition, Health, Link, MotorName, Reaction, Traffic};
 use crate::snake::model::PULSES_PER_TURN;
 use crate::snake::{Register, State};
@@ -50,7 +51,7 @@ impl Slot {
                 self.position_jumps = self.position_jumps.saturating_add(1);
                 self.distrust(now);
             }
-            self.rate = way / gap_s.max(SOONEST_S);
+            self.rate = way / limited(gap_s, SOONEST_S, f32::MAX);
         }
         if !self.guard.hear_in_time(now) {
             match self.raw {
@@ -129,10 +130,14 @@ impl Slot {
 /// Returns the largest way in pulses of a joint from a position, in a time since the position was heard: a little, and the larger of the
 /// way at its last rate and, if armed, the way to its target; beside that, 8 rad/s for a joint that sped up meanwhile.
 fn furthest(slot: &Slot, before: i32, gap_s: f32) -> f32 {
-    let time_s = gap_s.max(WAITED_S);
+    let time_s = limited(gap_s, WAITED_S, f32::MAX);
     let to_target = slot.target.wrapping_sub(before).unsigned_abs() as f32;
-    let asked = if slot.guard.is_armed() { to_target.min(slot.speed as f32 * time_s) } else { 0.0 };
-    JUMP as f32 + SPED_UP * gap_s + asked.max(1.5 * slot.rate * time_s)
+    let asked = if slot.guard.is_armed() {
+        limited(to_target, 0.0, slot.speed as f32 * time_s)
+    } else {
+        0.0
+    };
+    JUMP as f32 + SPED_UP * gap_s + limited(1.5 * slot.rate * time_s, asked, f32::MAX)
 }
 
 /// Notes a write or a request of another node.
