@@ -288,8 +288,12 @@ impl DriveProtocol for Motor {
     }
 
     fn capabilities(&self) -> Capabilities {
-        let known = self.mode.0.capabilities().with(Capability::Temperature);
-        known.with(Capability::ErrorCodes).with(Capability::AbsoluteAngle)
+        const FEEDBACK: Capabilities = Capabilities::of(&[
+            Capability::Temperature,
+            Capability::ErrorCodes,
+            Capability::AbsoluteAngle,
+        ]);
+        self.mode.0.capabilities().and(FEEDBACK)
     }
 
     fn vitals(&self) -> Vitals {

@@ -114,6 +114,11 @@ impl Capabilities {
         Self(self.0 | 1 << capability as u16)
     }
 
+    /// Adds the capabilities of another set.
+    pub(crate) const fn and(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
     /// Returns whether a capability is in the set.
     #[must_use]
     pub const fn has(self, capability: Capability) -> bool {

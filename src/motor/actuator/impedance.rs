@@ -110,11 +110,11 @@ impl ImpedanceControl {
     /// Returns the accepted targets.
     #[must_use]
     pub fn capabilities(&self) -> Capabilities {
-        let always = Capabilities::of(&[Capability::Torque, Capability::Impedance]);
+        const ALWAYS: Capabilities = Capabilities::of(&[Capability::Torque, Capability::Impedance]);
         match (self.gains, &self.loops) {
-            (None, None) => always,
-            (Some((stiffness, _)), None) if stiffness <= 0.0 => always.with(Capability::Velocity),
-            _ => always.with(Capability::Velocity).with(Capability::Angle),
+            (None, None) => ALWAYS,
+            (Some((stiffness, _)), None) if stiffness <= 0.0 => ALWAYS.with(Capability::Velocity),
+            _ => ALWAYS.with(Capability::Velocity).with(Capability::Angle),
         }
     }
 
