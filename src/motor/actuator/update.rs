@@ -7,7 +7,6 @@ use crate::frame::CanFrame;
 use crate::motor::{Capability, Condition, Ingest, Link, Repeat, Route, TargetError, Vitals};
 use crate::time::{Instant, TimeStep};
 use crate::units::Angle;
-use core::mem::discriminant;
 use embedded_can::Frame;
 
 /// Targets, and received frames: feedback, answers, and commands of another controller.
@@ -130,8 +129,7 @@ impl<M: DriveProtocol> Actuator<M> {
         kind: Capability,
         target: Result<Target, TargetError>,
     ) -> Result<(), TargetError> {
-        let is_kind = target.is_ok_and(|new| discriminant(&new) == discriminant(&self.target));
-        if !(is_kind && self.guard.has_target()) {
+        if kind != self.kind || !self.guard.has_target() {
             if !self.motor.capabilities().has(kind) {
                 return Err(TargetError::Unsupported);
             }
