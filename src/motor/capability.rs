@@ -1,4 +1,4 @@
-/// A kind of target that a motor takes, or a quantity that it reports.
+/// A kind of target for a motor, or a quantity in the feedback of a motor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

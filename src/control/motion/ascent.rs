@@ -333,7 +333,7 @@ impl Ascent {
             + self.top * curve.cruise
     }
 
-    /// Returns the motion of this duration, which is not below that of the direct motion, and how far beyond the target it ends.
+    /// Returns the motion of a duration, at least the duration of the direct motion, and the way from the target to the end of the motion.
     pub(super) fn lasting(&self, duration: f32) -> (Curve, f32) {
         let total = duration + self.acceleration;
         let curve = self.in_total(total);

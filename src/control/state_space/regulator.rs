@@ -20,7 +20,7 @@ use crate::math::limited;
 /// # Edge behaviour
 /// If a reference or a state is NaN or infinite, the last output is returned and [`rejected`](Self::rejected) grows. Outputs are
 /// within [`with_output_limit`](Self::with_output_limit), and within `f32` without a limit. A limit does not wind up: there is no
-/// integral. For a load that is constant, add a state for it to the plant and estimate it with a filter.
+/// integral. A constant load needs a state of its own in the plant, and a filter that estimates the state.
 ///
 /// # Examples
 /// A flywheel of 0.01 kg m² by a motor whose torque is the input; 5 rad/s is the acceptable error, 2 Nm the acceptable torque:

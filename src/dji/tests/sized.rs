@@ -98,7 +98,7 @@ fn a_motor_is_looked_at_in_each_twelfth_update_however_small_the_bus_is() {
 }
 
 proptest! {
-    /// Law: a bus with room for as many motors as it has does what one with room for all does.
+    /// Law: a bus for three motors gives the results of the largest bus with the same motors.
     #[test]
     fn a_sized_bus_is_a_bus(
         ids in prop::sample::subsequence(&[1_u8, 2, 3, 4, 5, 6, 7, 8][..], 3).prop_shuffle(),

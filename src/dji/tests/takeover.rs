@@ -193,8 +193,7 @@ fn a_position_loop_does_not_go_on_from_a_velocity_before_a_rest() {
     assert!((first - integral).abs() < 0.05, "{first} V: it is where it is to be");
 }
 
-/// A program that asks for nothing, and then for what it wants, in each tick: a hostile reader had a loop that went on with its
-/// first output for ever.
+/// In each tick a program sets one target, and then the wanted target in its place. A loop once kept its first output for ever then.
 #[test]
 fn what_is_replaced_before_it_is_done_leaves_the_loops_as_they_are() {
     type Ask = fn(&mut Bus, Handle<Gm6020Voltage>);
