@@ -136,10 +136,10 @@ impl Ascent {
         let (low, high) = (small.narrow(), large.narrow());
         let border = math::quick_root(1.0 - gap);
         let start = if rise < 0.0 { self.acceleration } else { 0.0 };
-        if start < 0.0
-            && let Some(curve) = self.falling(beginning, small, large, border)
-        {
-            return curve;
+        if start < 0.0 {
+            if let Some(curve) = self.falling(beginning, small, large, border) {
+                return curve;
+            }
         }
         let crest = self.cruising(0.0);
         let left = way - self.way_of(&crest);

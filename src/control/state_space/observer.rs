@@ -122,10 +122,10 @@ impl<const N: usize, const M: usize, const P: usize> KalmanFilter<N, M, P> {
     fn take(&mut self, found: Option<([Wide; N], Grid<Wide, N, N>)>) {
         let found = found.map(|(states, covariance)| (states, symmetric(&covariance)));
         let found = found.filter(|(_, covariance)| is_finite(covariance));
-        if self.estimate.take(found.map(|(states, _)| states))
-            && let Some((_, covariance)) = found
-        {
-            self.covariance = covariance;
+        if self.estimate.take(found.map(|(states, _)| states)) {
+            if let Some((_, covariance)) = found {
+                self.covariance = covariance;
+            }
         }
     }
 

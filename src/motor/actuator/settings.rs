@@ -212,12 +212,12 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
             }
             return Some(self.ask(request));
         }
-        if let Some(Missed { setting, written: Some(written), .. }) = self.missed
-            && turn.is_multiple_of(2)
-        {
-            let is_written = turn.is_multiple_of(4);
-            let write = Inquiry::Write(setting, written.value);
-            return Some(self.ask(if is_written { write } else { Inquiry::Read(setting) }));
+        if let Some(Missed { setting, written: Some(written), .. }) = self.missed {
+            if turn.is_multiple_of(2) {
+                let is_written = turn.is_multiple_of(4);
+                let write = Inquiry::Write(setting, written.value);
+                return Some(self.ask(if is_written { write } else { Inquiry::Read(setting) }));
+            }
         }
         if let Some(unknown) = self.complete() {
             return Some(unknown);
@@ -255,10 +255,10 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
     #[cold]
     #[inline(never)]
     pub(crate) fn hear(&mut self, read: impl FnOnce(Inquiry<R>) -> Option<f32>) {
-        if let Some(asked) = self.asked
-            && let Some(value) = read(asked)
-        {
-            self.take(asked, value);
+        if let Some(asked) = self.asked {
+            if let Some(value) = read(asked) {
+                self.take(asked, value);
+            }
         }
     }
 
