@@ -5,6 +5,9 @@ use super::safety::{DeviceGuard, MotorGuard, OPENING};
 use crate::motor::{Link, TargetError, Timeouts};
 use crate::time::{Duration, Instant};
 
+/// After a silence of so long a drive may have started again, in µs.
+pub(super) const SILENCE_US: u32 = 100_000;
+
 /// Decides whether one motor may be driven: for motors outside the families of this crate.
 ///
 /// Applies the rules of all motors of this crate to one motor of your own:
@@ -96,8 +99,9 @@ impl Guard {
         is_heard.then(|| age(now.stamp(), self.motor.heard()))
     }
 
-    pub(super) const fn is_late_by(&self, gap_us: u32) -> bool {
-        gap_us > self.device.timeouts().late_us()
+    /// Tells whether a drive may have started again without feedback for so long. Feedback that is late only after more is polled seldom.
+    pub(crate) const fn is_silence(&self, gap_us: u32) -> bool {
+        gap_us > SILENCE_US && gap_us > self.device.timeouts().late_us()
     }
 
     /// Changes the motor, and notes the consequences.

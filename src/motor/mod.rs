@@ -90,7 +90,7 @@ pub(crate) use health::{
 };
 pub use homing::{HomingStep, StopHoming};
 pub use link::{Link, Timeouts};
-pub(crate) use link::{age, is_near, take_age};
+pub(crate) use link::{age, furthest, is_near, take_age};
 pub use load::BusLoad;
 pub use safety::OPENING;
 pub(crate) use safety::{DeviceGuard, Guarded, Hold, MotorGuard, Repeat, Rest};

@@ -12,8 +12,8 @@ use core::f32::consts::TAU;
 
 /// A relaxed joint is disabled again after this time: its drive may have missed the frame.
 const KEEP_RELAXED: Duration = Duration::from_millis(100);
-/// Tolerance between two positions, beside twice the way at full speed: a sixteenth of a turn.
-const JUMP: i32 = PULSES_PER_TURN / 16;
+/// Tolerance between two positions in rad: a sixteenth of a turn.
+const JUMP: f32 = TAU / 16.0;
 /// One of so many speed requests is replaced by a check that the drive is still enabled.
 const CHECKS: u8 = 8;
 /// Two positions and one other register, until all others had their turn.
@@ -59,8 +59,9 @@ pub(super) struct Slot {
     homing: Homing,
     raw: Option<i32>,
     raw_speed: i32,
-    /// In pulses a second, by the last two positions.
+    /// In rad/s, up to the marked position and its time.
     rate: f32,
+    marked: (i32, Instant),
     heard: Instant,
     /// Target and speed, as on the wire.
     target: i32,
@@ -69,6 +70,8 @@ pub(super) struct Slot {
     pending: u8,
     ahead: u8,
     driven: bool,
+    /// The same at the last position.
+    was_driven: bool,
     stopped: Instant,
     turn: u8,
     pub(super) question: Option<Register>,
@@ -104,12 +107,14 @@ impl Slot {
         raw: None,
         raw_speed: 0,
         rate: 0.0,
+        marked: (0, Instant::START),
         heard: Instant::START,
         target: 0,
         speed: 0,
         pending: 0,
         ahead: 0,
         driven: false,
+        was_driven: false,
         stopped: Instant::START,
         turn: 0,
         question: None,

@@ -59,7 +59,7 @@ const AGES: Seeds<'static> = Seeds {
 };
 
 /// Ages that a family compares with a limit: of the frames of its drives, none of a link or a target. File, words, reason.
-const TIMES_OF_DRIVES: [(&str, &str, &str); 24] = [
+const TIMES_OF_DRIVES: [(&str, &str, &str); 23] = [
     ("dji/outbox.rs", "self . keep_alive_us", "zero frames are sent again"),
     (
         "dji/slot/gap.rs",
@@ -92,7 +92,7 @@ const TIMES_OF_DRIVES: [(&str, &str, &str); 24] = [
     ("snake/schedule.rs", "passed > timeout", "a reply that does not come is not waited for"),
     ("snake/slot.rs", "KEEP_RELAXED", "a disable is sent again: a drive may have missed it"),
     ("snake/slot.rs", "now < self . stopped", "the same after a set-back of the clock"),
-    ("snake/slot/health.rs", "furthest", "a position further away than a joint can have moved"),
+    ("snake/slot/health.rs", "RATE_SPAN", "the span of a rate"),
     ("snake/slot/health.rs", "window", "a joint that does not move, as its configuration says"),
     (
         "motor/actuator/joint.rs",
@@ -106,7 +106,6 @@ const TIMES_OF_DRIVES: [(&str, &str, &str); 24] = [
     ),
     ("motor/actuator/power.rs", "SETTLING", "a drive may report its former state for so long"),
     ("motor/actuator/power.rs", "told", "a frame for the power of a drive is sent again"),
-    ("motor/actuator/update.rs", "SILENCE_US", "a drive may have started again in a silence"),
     ("motor/actuator/update.rs", "inquired", "the rate of questions for settings"),
 ];
 
@@ -292,7 +291,6 @@ const OWN_NAMES: [(&str, &str, &[&str]); 26] = [
         "the core is asked, and settings of the drive",
         &[
             "Lost",
-            "SILENCE_US",
             "TimeoutUnits",
             "holds",
             "lose_zero",

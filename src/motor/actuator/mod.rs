@@ -37,8 +37,6 @@ use power::Power;
 
 /// The most frames a second for the power of a drive, each beside a command or rest.
 const POWER_HZ: u32 = 100;
-/// After a silence of so long a drive may have started again, in µs.
-const SILENCE_US: u32 = 100_000;
 /// The time between two questions for a setting.
 const INQUIRY: Duration = Duration::from_millis(10);
 

@@ -1,5 +1,6 @@
 //! The supply and the power of the drive of an actuator: whether the drive is enabled, and a jump of its angle.
 
+use crate::motor::furthest;
 use crate::time::{Duration, Instant};
 use crate::units::{Angle, AngularVelocity};
 
@@ -154,17 +155,13 @@ pub(super) struct Reading {
     pub(super) at: u32,
 }
 
-/// Feedback may have waited in a buffer for so long, in s.
-const WAITED_S: f32 = 0.04;
-
 impl Reading {
-    /// Returns the largest way in rad of the shaft to a later reading: at the larger of both velocities, for a little longer than the time
-    /// between them, and beside that 0.25 rad, and 8 rad/s for a shaft that sped up and stopped meanwhile.
+    /// Returns the largest way in rad of the shaft to a later reading, at the larger of both velocities.
     pub(super) fn furthest(&self, later: &Self, gap_s: f32) -> f32 {
         let (one, other) = (self.velocity.as_rad_per_s(), later.velocity.as_rad_per_s());
         // A velocity that is no number counts as none.
         let fastest = one.abs().max(other.abs()).max(0.0);
-        0.25 + 8.0 * gap_s + 1.5 * fastest * gap_s.max(WAITED_S)
+        0.25 + furthest(gap_s, fastest, (0.0, 0.0))
     }
 
     pub(super) fn gap_s(&self, later: &Self) -> f32 {

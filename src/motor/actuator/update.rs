@@ -2,8 +2,9 @@
 
 use super::joint::{Inside, Start};
 use super::power::Reading;
-use super::{Actuator, DriveProtocol, INQUIRY, Impedance, SILENCE_US, Target};
+use super::{Actuator, DriveProtocol, INQUIRY, Impedance, Target};
 use crate::frame::CanFrame;
+use crate::motor::guard::SILENCE_US;
 use crate::motor::{Capability, Condition, Ingest, Link, Repeat, Route, TargetError, Vitals};
 use crate::time::{Instant, TimeStep};
 use crate::units::Angle;
@@ -41,7 +42,7 @@ impl<M: DriveProtocol> Actuator<M> {
             self.motor.forget_settings();
         }
         let gap_us = gap_us.unwrap_or(0);
-        let is_silence = gap_us > SILENCE_US && self.guard.is_late_by(gap_us);
+        let is_silence = self.guard.is_silence(gap_us);
         if is_silence {
             self.motor.forget_settings();
         }

@@ -2,20 +2,15 @@
 
 use super::{ALL, JUMP, LAST, Slot, Standing};
 use crate::encoder::{Homing, Position};
-use crate::math::limited;
-use crate::motor::{Condition, Health, Link, MotorName, Reaction, Traffic};
+use crate::motor::{self, Condition, Health, Link, MotorName, Reaction, Traffic};
 use crate::snake::model::PULSES_PER_TURN;
 use crate::snake::{Register, State};
 use crate::time::{Duration, Edge, Instant};
 use crate::units::{Angle, AngularVelocity};
 use core::f32::consts::TAU;
 
-/// A position may have waited for so long, in s; two that waited come at once.
-const WAITED_S: f32 = 0.04;
-const SOONEST_S: f32 = 0.001;
-
-/// 8 rad/s in pulses a second.
-const SPED_UP: f32 = 8.0 * PULSES_PER_TURN as f32 / TAU;
+/// The rate is that of so long: a position may have waited, and the next one not.
+const RATE_SPAN: Duration = Duration::from_millis(20);
 
 /// A joint that moves less than this stands.
 const STANDS: u32 = PULSES_PER_TURN.unsigned_abs() / 256;
@@ -45,14 +40,16 @@ impl Slot {
     fn receive_position(&mut self, raw: i32, now: Instant) {
         let gap_us = now.since(self.heard).micros_u32().unwrap_or(u32::MAX);
         if let (Some(before), Link::Online | Link::Late) = (self.raw, self.guard.link()) {
-            let (way, gap_s) =
-                (raw.wrapping_sub(before).unsigned_abs() as f32, gap_us as f32 * 1e-6);
-            if way > furthest(self, before, gap_s) {
+            if self.guard.is_silence(gap_us) {
+                self.lose_zero(now);
+                self.guard.relax_until_armed();
+            } else if way(before, raw) > furthest(self, before, gap_us as f32 * 1e-6) {
                 self.position_jumps = self.position_jumps.saturating_add(1);
                 self.distrust(now);
             }
-            self.rate = way / limited(gap_s, SOONEST_S, f32::MAX);
         }
+        self.was_driven = self.driven;
+        measure_rate(self, raw, now);
         if !self.guard.hear_in_time(now) {
             match self.raw {
                 Some(_) => self.traffic.gap(gap_us),
@@ -127,17 +124,25 @@ impl Slot {
     }
 }
 
-/// Returns the largest way in pulses of a joint from a position, in a time since the position was heard: a little, and the larger of the
-/// way at its last rate and, if armed, the way to its target; beside that, 8 rad/s for a joint that sped up meanwhile.
+/// Returns the way between two positions in rad.
+fn way(one: i32, other: i32) -> f32 {
+    other.wrapping_sub(one).unsigned_abs() as f32 * (TAU / PULSES_PER_TURN as f32)
+}
+
+/// Returns the largest way of a joint from a position, so many s after the position was heard: to its target, if led since.
 fn furthest(slot: &Slot, before: i32, gap_s: f32) -> f32 {
-    let time_s = limited(gap_s, WAITED_S, f32::MAX);
-    let to_target = slot.target.wrapping_sub(before).unsigned_abs() as f32;
-    let asked = if slot.guard.is_armed() {
-        limited(to_target, 0.0, slot.speed as f32 * time_s)
-    } else {
-        0.0
-    };
-    JUMP as f32 + SPED_UP * gap_s + limited(1.5 * slot.rate * time_s, asked, f32::MAX)
+    let is_led = slot.driven || slot.was_driven;
+    let asked = if is_led { (way(before, slot.target), way(0, slot.speed)) } else { (0.0, 0.0) };
+    JUMP + motor::furthest(gap_s, slot.rate, asked)
+}
+
+fn measure_rate(slot: &mut Slot, raw: i32, now: Instant) {
+    let (before, since) = slot.marked;
+    let span = now.since(since);
+    if slot.raw.is_none() || span >= RATE_SPAN {
+        slot.rate = if slot.raw.is_none() { 0.0 } else { way(before, raw) / span.as_secs_f32() };
+        slot.marked = (raw, now);
+    }
 }
 
 /// Notes a write or a request of another node.

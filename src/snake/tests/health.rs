@@ -317,3 +317,61 @@ fn it_offers_positions_and_nothing_once_it_is_detached() {
     bench.joints.detach(neck);
     assert_eq!(bench.joints.capabilities(neck).to_string(), "nothing");
 }
+
+/// Armed, homed at `pulses` from where its drive counts, and driven there for 30 ms.
+fn homed() -> Bench {
+    let mut bench = Bench::armed(&[1]);
+    bench.joints.set_offset(bench.handles[0], -65_536).unwrap();
+    bench.joints.set_speed(bench.handles[0], AngularVelocity::from_rpm(200.0)).unwrap();
+    for _ in 0..30 {
+        bench.joints.set_pulses(bench.handles[0], 0).unwrap();
+        bench.run(1);
+    }
+    assert!(bench.state(0).is_driven);
+    bench
+}
+
+/// Reports another position after a time in which nothing was heard, and not even an update was made if `is_stalled`. Returns whether the
+/// zero counts as lost, and whether the joint is enabled again by targets.
+fn turns_unheard(bench: &mut Bench, silent_ms: u64, is_stalled: bool, raw: i32) -> (bool, bool) {
+    if is_stalled {
+        bench.ms += silent_ms;
+    } else {
+        bench.silent = std::vec![1];
+        bench.run(silent_ms);
+        bench.silent.clear();
+    }
+    bench.raw[0] = raw;
+    bench.hear(Register::ActualPosition, raw);
+    let sent = bench.drive(100);
+    let is_enabled = sent.contains(&(1, Command::Write(Register::Enable, 1)));
+    (bench.state(0).homing == Homing::Uncertain, is_enabled)
+}
+
+#[test]
+fn a_zero_is_lost_in_a_silence_of_which_a_stalled_loop_knows_nothing() {
+    assert_eq!(turns_unheard(&mut homed(), 900, true, 61_000), (true, false));
+    assert_eq!(turns_unheard(&mut homed(), 101, true, 0), (true, false), "as an offline joint");
+    assert_eq!(turns_unheard(&mut homed(), 99, true, 0).0, false);
+}
+
+#[test]
+fn a_joint_that_is_not_led_does_not_turn_to_a_target_of_before() {
+    let mut bench = homed();
+    bench.run(500);
+    assert!(!bench.state(0).is_driven);
+    assert_eq!(turns_unheard(&mut bench, 80, false, 27_000), (true, false));
+    // Led, the joint may be on the way.
+    assert_eq!(turns_unheard(&mut homed(), 80, false, 27_000).0, false);
+}
+
+#[test]
+fn two_positions_at_once_after_one_that_waited_are_no_great_speed() {
+    let mut bench = homed();
+    bench.run(500);
+    bench.ms += 35;
+    bench.hear(Register::ActualPosition, 100);
+    bench.ms += 1;
+    bench.hear(Register::ActualPosition, 2_200);
+    assert_eq!(turns_unheard(&mut bench, 60, true, 92_200), (true, false));
+}
