@@ -69,6 +69,8 @@ pub(super) struct Reference {
     /// The target, as a share of the full output.
     value: f64,
     opening: Opening,
+    /// The motor had no target in an update since it was driven, or was armed.
+    has_rested: bool,
     /// The share of the last command, which a bus finds at the turn of the motor.
     share: f64,
     /// The updates of a bus with a usable step.
@@ -110,6 +112,7 @@ impl Reference {
             rival: Rival::new(rules.rivals, setup.on_rival),
             value: 0.0,
             opening: Opening::new(setup.opening),
+            has_rested: true,
             share: 1.0,
             steps: 0,
             commanded: 0,
@@ -136,6 +139,11 @@ impl Reference {
     pub(super) fn hear(&mut self, now: u64, link: Link) {
         let Some(late_us) = self.rules.late_us else { return };
         self.edges.begin_call();
+        let is_silence = now.saturating_sub(self.heard) > OFFLINE_US.max(late_us);
+        if self.rules.loses_zero && is_silence && matches!(self.link, Link::Online | Link::Late) {
+            self.edges.set(Condition::PositionUncertain, true, now);
+            self.fall_to(Arming::Tripped);
+        }
         if !self.is_running {
             self.forget_after_a_pause(self.updated, now);
             self.updated = now;
@@ -280,6 +288,7 @@ impl Reference {
         self.bad_steps = if is_usable { 0 } else { self.bad_steps + 1 };
         let may_drive = self.is_armed() && self.link == Link::Online && self.target.is_some();
         let may_repeat = core::mem::replace(&mut self.may_repeat, has_step && may_drive);
+        self.has_rested |= self.target.is_none();
         let drives = match self.rules.bad_step {
             _ if has_step => may_drive,
             BadStep::Unknown => may_drive,

@@ -204,7 +204,10 @@ impl<M: DriveProtocol> Actuator<M> {
 
     /// Finds what the drive is told of the target, and the share of the output, of which the conditions leave so much.
     fn follow(&mut self, left: f32, step: TimeStep) {
-        self.is_resting = false;
+        // Without an earlier command nothing is known of the load.
+        if core::mem::take(&mut self.is_resting) {
+            self.reopen();
+        }
         let opened = self.guard.share();
         self.is_narrowed = opened < 1.0 || self.watch.soft_limits().is_some();
         if self.is_narrowed {

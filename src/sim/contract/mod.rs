@@ -252,9 +252,9 @@ impl<S: Subject> Run<S> {
         self.expect(driven, rule)
     }
 
-    /// Drives after there was no target: the drives may have to be enabled.
+    /// Drives after there was no target: the drives may have to be enabled, and their output range to open.
     fn drive_again(&mut self, rule: Rule) -> Outcome {
-        for _ in 0..=self.subject.preparation_ms() {
+        for _ in 0..=self.subject.preparation_ms() + self.subject.opening_ms() {
             let is_taken = self.subject.drive(1.0).is_ok();
             self.expect(is_taken, rule)?;
             if self.step()?.driving > 0 {

@@ -42,6 +42,7 @@ impl Reference {
         if !self.is_armed() {
             self.relax();
             self.arming = Arming::Armed;
+            self.has_rested = true;
             self.open(now);
         }
         self.armed_at = self.armed_at.max(now);

@@ -77,6 +77,9 @@ impl Reference {
     pub(crate) fn predict(&mut self, now: u64) -> Bounds {
         let opens = self.rules.opens;
         let is_bus = self.rules.bad_step == BadStep::Repeats;
+        if core::mem::take(&mut self.has_rested) && self.rules.opens_again {
+            self.opening.begin(now);
+        }
         if !is_bus {
             self.share = self.opening.share(now);
         }

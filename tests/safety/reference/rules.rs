@@ -35,9 +35,11 @@ pub(crate) struct Rules {
     pub(crate) is_prepared: bool,
     /// So many unread edges have an order and a time of their own.
     pub(crate) room: usize,
-    /// A motor that was lost no longer knows its zero.
+    /// A motor that was lost no longer knows its zero, and trips if no update noticed that.
     pub(crate) loses_zero: bool,
     pub(crate) opens: Opens,
+    /// The output opens anew also after rest without a target.
+    pub(crate) opens_again: bool,
     /// An output is exact within this.
     pub(crate) resolution: f64,
     pub(crate) rivals: Rivals,

@@ -76,7 +76,7 @@ impl Both {
 }
 
 impl Subject<2> for Both {
-    const RULES: [Rules; 2] = [BUS, Rules { opens: Opens::Fills, ..OWN }];
+    const RULES: [Rules; 2] = [BUS, Rules { opens: Opens::Fills, ..ACTUATOR }];
 
     stops!(self => (&mut self.0.0, &mut self.1));
 

@@ -159,7 +159,7 @@ impl Vesc {
 }
 
 impl Subject<1> for Vesc {
-    const RULES: [Rules; 1] = [OWN];
+    const RULES: [Rules; 1] = [ACTUATOR];
 
     own!(self => self.0);
 

@@ -74,13 +74,15 @@ const BUS: Rules = Rules {
     room: 12,
     loses_zero: false,
     opens: Opens::Clamps,
+    opens_again: false,
     resolution: 1e-4,
     rivals: Rivals::AtTurn,
 };
 const OWN: Rules =
     Rules { bad_step: BadStep::Ages, arms_again: false, room: 6, rivals: Rivals::AtUpdate, ..BUS };
+const ACTUATOR: Rules = Rules { opens_again: true, ..OWN };
 /// A drive whose own loop follows the target, with the resolution of its frames.
-const PREPARED: Rules = Rules { is_prepared: true, resolution: 0.013, ..OWN };
+const PREPARED: Rules = Rules { is_prepared: true, resolution: 0.013, ..ACTUATOR };
 const FOLLOWING: Rules = Rules { opens: Opens::Scales, resolution: 0.002, ..PREPARED };
 
 /// No motor here turns: that one stands in spite of its output is not looked for.
