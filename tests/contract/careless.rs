@@ -412,6 +412,8 @@ enum Haste {
     BeginsAbove,
     OpensTooEarly,
     HasNoLimit,
+    /// Its command is an offset binary number, and its rest zero bytes.
+    RestsAtTheEnd,
 }
 
 /// A motor whose command is its torque in percent of the largest, 2 Nm.
@@ -436,7 +438,7 @@ impl DriveProtocol for Hasty {
     fn control(&mut self, Order { target, share, .. }: Order) -> CanFrame {
         let Target::Torque(torque_nm) = target else { return self.rest() };
         let limit = match self.0 {
-            Haste::None => share,
+            Haste::None | Haste::RestsAtTheEnd => share,
             Haste::IgnoresTheShare => 1.0,
             Haste::BeginsAbove => (0.3 + 0.7 * share).min(1.0),
             Haste::OpensTooEarly => (3.0 * share).min(1.0),
@@ -445,7 +447,8 @@ impl DriveProtocol for Hasty {
         let effort = (torque_nm / 2.0).clamp(-limit, limit);
         #[expect(clippy::cast_possible_truncation, reason = "saturates")]
         let percent = (100.0 * effort) as i8;
-        CanFrame::new(id(0x123), &percent.to_be_bytes()).unwrap()
+        let offset = if self.0 == Haste::RestsAtTheEnd { 100 } else { 0 };
+        CanFrame::new(id(0x123), &[percent.cast_unsigned().wrapping_add(offset)]).unwrap()
     }
     fn reset(&mut self) {}
     fn capabilities(&self) -> Capabilities {
@@ -470,7 +473,12 @@ impl Subject for HastySubject {
         self.0.set_torque(2.4 * share)
     }
     fn effort(&self, command: &CanFrame) -> Option<f32> {
-        self.1.then(|| f32::from(command.bytes()[0].cast_signed()) / 100.0)
+        let [byte, ..] = *command.bytes();
+        let percent = match self.0.motor().0 {
+            Haste::RestsAtTheEnd => f32::from(byte) - 100.0,
+            _ => f32::from(byte.cast_signed()),
+        };
+        self.1.then_some(percent / 100.0)
     }
 }
 
@@ -482,6 +490,7 @@ fn the_check_finds_a_loop_that_drives_at_once_or_without_a_limit() {
         (Haste::BeginsAbove, true, Err(Rule::OpensFromZero)),
         (Haste::OpensTooEarly, true, Err(Rule::OpensFromZero)),
         (Haste::HasNoLimit, true, Err(Rule::OpensFromZero)),
+        (Haste::RestsAtTheEnd, true, Err(Rule::DisarmedIsZero)),
     ] {
         let checked = check_contract(|| HastySubject(Actuator::new(Hasty(haste)), knows_effort));
         assert_eq!(checked.map_err(|violation| violation.rule), found, "{haste:?}");

@@ -51,13 +51,14 @@ pub trait Subject {
         embedded_can::Frame::new(command.id(), &[0; 8])
     }
 
-    /// Returns whether a command frame asks for nothing: eight zeros, unless said otherwise.
+    /// Returns whether a command frame asks for nothing: eight zeros, unless said otherwise. A frame whose [`effort`](Self::effort) is known
+    /// and more than 0.01 asks for something all the same: zero bytes are the full negative torque of some drives.
     fn is_zero(&self, command: &CanFrame) -> bool {
         *command.bytes() == [0; 8]
     }
 
     /// Returns the effort that a command asks of its motor, as a share of the largest, -1 to 1; `None`, the default, for a command
-    /// whose effort only the drive knows.
+    /// whose effort only the drive knows. Read the frame as the manual of the drive does: with `None`, nothing checks that rest is rest.
     fn effort(&self, command: &CanFrame) -> Option<f32> {
         let _ = command;
         None
@@ -187,6 +188,9 @@ type Outcome = Result<(), Violation>;
 
 /// More frames than a device may offer between two updates.
 const MOST_FRAMES: u32 = 64;
+
+/// The largest effort of a frame that asks for nothing: rounding of the protocol.
+const LITTLE: f32 = 0.01;
 
 /// The frames between two updates.
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
@@ -322,7 +326,8 @@ impl<S: Subject> Run<S> {
         let mut output = Output::default();
         while let Some(frame) = self.subject.device().next_frame(self.turn) {
             output.frames += 1;
-            let drives = !self.subject.is_zero(&frame);
+            let effort = self.effort(&frame);
+            let drives = !self.subject.is_zero(&frame) || effort > LITTLE;
             if drives || output.driving == 0 {
                 self.last = Some(frame);
             }
@@ -330,7 +335,7 @@ impl<S: Subject> Run<S> {
             let own = self.is_command(&frame);
             self.expect(own, Rule::SendsWhatItClaims)?;
             output.driving += u32::from(drives);
-            output.effort = output.effort.max(self.effort(&frame));
+            output.effort = output.effort.max(effort);
             output.last = Some(frame);
             let bytes = frame.header().to_be_bytes().into_iter().chain(*frame.bytes());
             // FNV-1a.
