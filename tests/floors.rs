@@ -380,6 +380,10 @@ fn each_family_has_the_files_of_the_guide_and_is_named_around_its_folder() {
         .collect();
     let on_pins = |name: &&&str| **name != "pwm";
     assert_eq!(floor.iter().filter(on_pins).copied().collect::<Vec<_>>(), FAMILIES);
+    let mut sized: Vec<&str> =
+        SIZES.iter().chain(&SIZES_WITH_A_BUS).map(|(family, _)| *family).collect();
+    sized.sort_unstable();
+    assert_eq!(sized, FAMILIES, "each family has a size");
 }
 
 /// The families that `docs/adding-a-family.md` describes, with the most lines of code without tests and documentation.

@@ -326,7 +326,7 @@ impl<M: DriveProtocol> Actuator<M> {
     /// for feedback.
     fn act(&mut self, may_drive: bool) -> Option<CanFrame> {
         if !may_drive || !self.power.is_ready() {
-            // A late motor keeps its integral, one without a target starts afresh.
+            // A late motor with a target keeps its integral, a motor without a target starts afresh.
             if !self.guard.has_target() {
                 self.relax();
             }
