@@ -37,9 +37,9 @@ pub(crate) fn extended_id(raw: u32) -> Id {
     ExtendedId::new(raw).unwrap_or(ExtendedId::MAX).into()
 }
 
-/// 0 to 8. With this bound known to the compiler, an optional frame takes the room of a frame.
+/// 0 to 8. With this bound known to the compiler, an optional frame takes the room of a frame; as a word, a frame is copied by words.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
-#[repr(u8)]
+#[repr(u32)]
 enum Length {
     L0,
     L1,

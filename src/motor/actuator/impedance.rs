@@ -42,7 +42,7 @@ pub struct ImpedanceControl {
     torque_limit_nm: f32,
     gains: Option<(f32, f32)>,
     loops: Option<TorqueLoops>,
-    effort: f32,
+    torque_nm: f32,
 }
 
 impl ImpedanceControl {
@@ -52,7 +52,7 @@ impl ImpedanceControl {
     /// [`ConfigError::NotPositive`] for a limit that is zero, negative or not finite.
     pub const fn new(torque_limit_nm: f32) -> Result<Self, ConfigError> {
         if torque_limit_nm > 0.0 && torque_limit_nm.is_finite() {
-            Ok(Self { torque_limit_nm, gains: None, loops: None, effort: 0.0 })
+            Ok(Self { torque_limit_nm, gains: None, loops: None, torque_nm: 0.0 })
         } else {
             Err(ConfigError::NotPositive("torque_limit"))
         }
@@ -104,7 +104,7 @@ impl ImpedanceControl {
     /// Returns the torque of the last step as a share of the limit, -1 to 1.
     #[must_use]
     pub const fn effort(&self) -> f32 {
-        self.effort
+        self.torque_nm / self.torque_limit_nm
     }
 
     /// Returns the accepted targets.
@@ -149,9 +149,8 @@ impl ImpedanceControl {
             Target::Torque(torque_nm) => torque_nm,
             _ => looped?,
         };
-        let torque_nm = limited(wanted, -limit, limit);
-        self.effort = torque_nm / self.torque_limit_nm;
-        Some(torque_nm)
+        self.torque_nm = limited(wanted, -limit, limit);
+        Some(self.torque_nm)
     }
 
     /// Returns the command of a target that is no [torque alone](Self::torque_alone), as [`step`](Self::step).
@@ -163,13 +162,13 @@ impl ImpedanceControl {
         most: &Impedance,
         count: &Impedance,
     ) -> Option<Impedance> {
-        self.effort = 0.0;
+        self.torque_nm = 0.0;
         let (limit, share, (angle, velocity)) =
             (self.torque_limit_nm * order.share, order.share, shaft);
         let wanted = self.wanted(&order, angle)?;
         let torque_nm = limited(wanted.torque_nm, -limit, limit);
         if wanted.stiffness <= 0.0 && wanted.damping <= 0.0 {
-            self.effort = torque_nm / self.torque_limit_nm;
+            self.torque_nm = torque_nm;
             return Some(Impedance::torque(torque_nm));
         }
         let (per_count, per_count_s) = (count.angle.as_radians(), count.velocity.as_rad_per_s());
@@ -188,7 +187,7 @@ impl ImpedanceControl {
         if damping > 0.0 && velocity.as_rad_per_s().abs() >= end - 0.5 * per_count_s {
             let spring_nm = limited(torque_nm + stiffness * way, -limit, limit);
             let torque_nm = limited(spring_nm + damping * change, -limit, limit);
-            self.effort = torque_nm / self.torque_limit_nm;
+            self.torque_nm = torque_nm;
             return Some(Impedance { torque_nm, ..Impedance::FREE });
         }
         let stiffness = whole(stiffness, per_count, limit, count.stiffness);
@@ -198,7 +197,7 @@ impl ImpedanceControl {
         let way = within(way, torque_nm, stiffness, limit);
         let spring_nm = torque_nm + stiffness * way;
         let change = within(change, spring_nm, damping, limit);
-        self.effort = (spring_nm + damping * change) / self.torque_limit_nm;
+        self.torque_nm = spring_nm + damping * change;
         Some(Impedance {
             angle: Angle::from_radians(at + way),
             velocity: velocity + AngularVelocity::from_rad_per_s(change),
@@ -220,7 +219,7 @@ impl ImpedanceControl {
             self.spring_alone(*order, shaft(), most_velocity)?;
         }
         let limit = self.torque_limit_nm * order.share;
-        Some(limited(self.effort * self.torque_limit_nm, -limit, limit))
+        Some(limited(self.torque_nm, -limit, limit))
     }
 
     fn spring_alone(
@@ -241,7 +240,7 @@ impl ImpedanceControl {
 
     /// Brings the loops to rest.
     pub const fn reset(&mut self) {
-        self.effort = 0.0;
+        self.torque_nm = 0.0;
         if let Some(loops) = &mut self.loops {
             loops.reset();
         }
