@@ -349,7 +349,7 @@ impl<B, const N: usize> Bus<B, N> {
 
     /// Returns the next command frame to send, and removes it from the list.
     ///
-    /// Costs 54 instructions on a Cortex-M4F, for the two frames of 8 motors and the end (`docs/figures.md`).
+    /// Costs 52 instructions on a Cortex-M4F, for the two frames of 8 motors and the end (`docs/figures.md`).
     #[inline]
     pub fn next_frame(&mut self) -> Option<CanFrame> {
         self.outbox.next()

@@ -206,6 +206,7 @@ impl DriveProtocol for Motor {
         self.mode.control.capabilities().with(Capability::ErrorCodes)
     }
 
+    #[inline]
     fn vitals(&self) -> Vitals {
         let told = self.state.heartbeat.map_or(0, |heartbeat| heartbeat.error_code());
         let (active, reason) = self.state.errors;

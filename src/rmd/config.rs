@@ -4,6 +4,7 @@ use super::{Command, Feedback, Model, State};
 use crate::error::ConfigError;
 pub use crate::lk::Mode;
 use crate::lk::bus::whole;
+use crate::math::limited;
 use crate::motor::Questions;
 use crate::time::Duration;
 
@@ -12,9 +13,9 @@ const TIMEOUT_MS: u32 = 100;
 
 /// A motor of this family, in one control mode: see the [module](super).
 ///
-/// Costs 5134 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
+/// Costs 4704 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
 ///
-/// Costs 216 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
+/// Costs 192 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
 ///
 /// # Examples
 /// ```
@@ -165,7 +166,7 @@ impl Track {
     /// Moves on by a way, within a degree of what feedback says.
     pub(super) fn advance(&mut self, way: f32, degrees: i16) {
         let moved = 100.0 * f32::from(degrees.wrapping_sub(self.degrees));
-        self.way = (self.way + way).min(moved + 100.0).max(moved - 100.0);
+        self.way = limited(self.way + way, moved - 100.0, moved + 100.0);
     }
 
     /// Tells whether an angle is more than half a turn away.

@@ -24,9 +24,9 @@ const COMMANDS: [(u32, u32); 3] =
 
 /// A motor of this family in a run mode: see the [module](super).
 ///
-/// Costs 5245 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
+/// Costs 4972 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
 ///
-/// Costs 225 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
+/// Costs 204 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
 ///
 /// # Examples
 /// ```

@@ -190,18 +190,17 @@ impl Status {
     }
 }
 
-/// The types of frames from a drive: feedback, a parameter, its faults as the manual counts their bits, and its firmware on the
-/// question of another node, with the type of feedback.
+/// The types of frames from a drive: feedback, a parameter, and its faults as the manual counts their bits.
 const FEEDBACK: u8 = 2;
 pub(super) const VALUE: u8 = 17;
 pub(super) const FAULTS: u8 = 21;
-const VERSION: [u8; 3] = [0x00, 0xC4, 0x56];
 
 /// Reads a frame other than feedback: its type, whether the drive knows the parameter in question, and the data.
 pub(super) fn answer(frame: &CanFrame) -> Option<(u8, bool, [u8; 8])> {
     let (raw, data) = (raw_of(frame)?, *frame.bytes());
     let [kind, status, ..] = raw.to_be_bytes();
-    let is_version = kind == FEEDBACK && data.starts_with(&VERSION);
+    // Its firmware, on the question of another node.
+    let is_version = kind == FEEDBACK && matches!(data, [0x00, 0xC4, 0x56, ..]);
     let is_answer = frame.length() == 8 && (is_version || matches!(kind, VALUE | FAULTS));
     is_answer.then_some((kind, status == 0, data))
 }

@@ -4,7 +4,7 @@ use super::Model;
 use super::codec::Command;
 use crate::control::{Pid, PidConfig};
 use crate::error::ConfigError;
-use crate::math::wrap_tau;
+use crate::math::{limited, wrap_tau};
 use crate::motor::{Capabilities, Capability, Order, Target, TorqueLoops};
 use crate::units::{Angle, AngularVelocity};
 
@@ -95,9 +95,10 @@ impl CurrentControl {
             (Target::Angle(_), _) if !self.has_angle => return None,
             (_, loops) => loops.as_mut()?.step(&order, || (at.angle, at.velocity), limit)?,
         };
-        let torque = kept(wanted, limit);
+        let torque = limited(wanted, -limit, limit);
         // Rounding of the quotient must not take it past the limit.
-        let current = kept(model.current_of(torque), model.current_limit_a * share);
+        let most = model.current_limit_a * share;
+        let current = limited(model.current_of(torque), -most, most);
         Some((Command::Current(current), Some(torque / most)))
     }
 }
@@ -112,7 +113,7 @@ struct DutyControl {
 impl DutyControl {
     fn command(&mut self, order: Order, at: &At) -> Option<(Command, Option<f32>)> {
         let Order { target: Target::Velocity(target), share, step } = order else { return None };
-        let reported = kept(at.duty, self.limit);
+        let reported = limited(at.duty, -self.limit, self.limit);
         let near = self.limit * share;
         let lowest = (reported - near).max(-self.limit);
         let highest = (reported + near).min(self.limit);
@@ -220,7 +221,7 @@ impl Mode {
         let target = match order.target {
             Target::Velocity(velocity) => {
                 let limit = at.model.max_velocity.as_rad_per_s();
-                let velocity = kept(velocity.as_rad_per_s(), limit);
+                let velocity = limited(velocity.as_rad_per_s(), -limit, limit);
                 Target::Velocity(AngularVelocity::from_rad_per_s(velocity))
             }
             target => target,
@@ -271,8 +272,4 @@ fn position(order: Order, at: &At) -> Option<(Command, Option<f32>)> {
     at.angle?;
     let angle = Angle::from_radians(wrap_tau(target.as_radians()));
     Some((Command::Position(angle.as_degrees()), None))
-}
-
-const fn kept(value: f32, limit: f32) -> f32 {
-    value.min(limit).max(-limit)
 }

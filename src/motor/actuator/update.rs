@@ -5,7 +5,9 @@ use super::power::Reading;
 use super::{Actuator, DriveProtocol, INQUIRY, Impedance, Target};
 use crate::frame::CanFrame;
 use crate::motor::guard::SILENCE_US;
-use crate::motor::{Capability, Condition, Ingest, Link, Repeat, Route, TargetError, Vitals};
+use crate::motor::{
+    Capability, Claim, Condition, Ingest, Link, Repeat, Route, TargetError, Vitals,
+};
 use crate::time::{Instant, TimeStep};
 use crate::units::Angle;
 use embedded_can::Frame;
@@ -82,22 +84,27 @@ impl<M: DriveProtocol> Actuator<M> {
         if self.route.is_unknown() {
             self.route = Route::of(|| self.motor.claims());
         }
-        let (mut is_feedback, mut command) = (false, None);
-        for claim in self.motor.claims().into_iter().filter(|claim| claim.covers(frame.id())) {
-            if claim.is_feedback() {
-                is_feedback = true;
-            } else if !claim.is_shared() {
-                // What others send on a shared id may be for another drive.
-                command = Some(claim);
-            }
-        }
+        let is_its = |claim: Claim| claim.is_feedback() && claim.covers(frame.id());
+        let is_feedback =
+            self.route.usual.fits(frame) || self.motor.claims().into_iter().any(is_its);
         let outcome = if is_feedback { self.take(frame, now) } else { Ingest::Unrelated };
-        if outcome == Ingest::Unrelated && command.is_some() {
+        if outcome == Ingest::Unrelated {
+            self.hear_command(frame, now);
+        }
+        outcome
+    }
+
+    /// Notes a command of another controller. What others send on a shared id may be for another drive.
+    #[inline(never)]
+    fn hear_command(&mut self, frame: &CanFrame, now: Instant) {
+        let is_its =
+            |claim: &Claim| !claim.is_feedback() && !claim.is_shared() && claim.covers(frame.id());
+        let command = self.motor.claims().into_iter().find(is_its);
+        if command.is_some() {
             self.rival = command;
             self.watch.hear_rival(now);
             self.is_steady = false;
         }
-        outcome
     }
 
     /// Trips the motor as by a fault that the drive reports in one update.
