@@ -220,3 +220,36 @@ fn a_silent_joint_is_stopped_by_the_first_update_after_ten_milliseconds_whatever
         assert_eq!(bench.ms - asked, waits_ms, "{timeout_ms} ms");
     }
 }
+
+/// A question for one register that was given up says nothing of those for another.
+#[test]
+fn a_reply_settles_its_register_and_a_question_given_up_is_of_its_register_alone() {
+    let mut bench = Bench::new(&[3]);
+    let position = ask(&mut bench);
+    bench.ms += 3; // given up
+    assert_eq!(ask(&mut bench), position);
+    bench.hear_of(3, Register::ActualPosition, 0); // and settled
+    assert_ne!(ask(&mut bench), position);
+    bench.ms += 3; // the speed is given up
+    assert_eq!(ask(&mut bench), position);
+    assert!(bench.joints.requeue(&position));
+    assert_eq!(bench.joints.awaited(bench.handles[0]), None, "it was not sent");
+}
+
+#[test]
+fn a_check_of_the_enable_that_was_not_sent_comes_again() {
+    let mut bench = Bench::new(&[3]);
+    let enable = Command::Read(Register::Enable).frame(3).unwrap();
+    let mut questions = 1;
+    loop {
+        let question = ask(&mut bench);
+        if question == enable {
+            break;
+        }
+        questions += 1;
+        bench.answer(3, Command::decode(question.data()).unwrap());
+    }
+    assert_eq!(questions, 24);
+    assert!(bench.joints.requeue(&enable));
+    assert_eq!(ask(&mut bench), enable);
+}

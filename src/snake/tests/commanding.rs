@@ -178,3 +178,60 @@ fn an_enable_that_comes_back_after_a_disable_is_not_sent_before_the_bring_up() {
     again.extend((0..6).map(|_| taken(&mut bench)));
     assert_eq!(again, sequence);
 }
+
+/// Other values than those of a joint without settings.
+const HEAVY: Config = Config::new(4)
+    .with_mode(3)
+    .with_current(1_500)
+    .with_acceleration(400_000)
+    .with_deceleration(300_000);
+
+const HEAVY_WRITES: [Command; 4] = [
+    Command::Write(Register::Mode, 3),
+    Command::Write(Register::Current, 1_500),
+    Command::Write(Register::Acceleration, 400_000),
+    Command::Write(Register::Deceleration, 300_000),
+];
+
+#[test]
+fn a_joint_is_brought_up_with_the_settings_of_its_configuration() {
+    let told = (HEAVY.mode(), HEAVY.current(), HEAVY.acceleration(), HEAVY.deceleration());
+    assert_eq!(told, (3, 1_500, 400_000, 300_000));
+    let mut bench = Bench::new(&[]);
+    bench.handles.push(bench.joints.attach(HEAVY).unwrap());
+    bench.run(30);
+    bench.joints.arm(at_ms(bench.ms)).unwrap();
+    assert_eq!(writes(&bench.drive(4)), HEAVY_WRITES);
+}
+
+#[test]
+fn settings_of_a_joint_that_moves_are_written_once_and_unusable_ones_never() {
+    let mut bench = Bench::armed(&[4]);
+    let joint = bench.handles[0];
+    bench.drive(20);
+    bench.joints.set_settings(joint, &HEAVY).unwrap();
+    assert_eq!(writes(&bench.drive(4)), HEAVY_WRITES);
+    let unusable = [
+        (HEAVY.with_current(0), "current"),
+        (HEAVY.with_acceleration(0), "acceleration"),
+        (HEAVY.with_deceleration(-1), "deceleration"),
+    ];
+    for (config, parameter) in unusable {
+        let refused = bench.joints.set_settings(joint, &config).unwrap_err().to_string();
+        assert_eq!(refused, std::format!("snake joint #4: {parameter} is not usable"));
+    }
+    let target = Command::Write(Register::Position, 1_000);
+    assert!(writes(&bench.drive(20)).iter().all(|command| *command == target));
+    // Of the next bring-up, too.
+    bench.joints.relax(joint);
+    assert_eq!(writes(&bench.drive(4))[1..], HEAVY_WRITES);
+}
+
+#[test]
+fn what_a_bring_up_writes_is_what_can_be_written() {
+    let sent = writes(&Bench::armed(&[4]).drive(7));
+    for register in Register::ALL {
+        let is_written = sent.iter().any(|c| matches!(c, Command::Write(to, _) if *to == register));
+        assert_eq!(register.is_writable(), is_written, "{register:?}");
+    }
+}

@@ -375,3 +375,109 @@ fn two_positions_at_once_after_one_that_waited_are_no_great_speed() {
     bench.hear(Register::ActualPosition, 2_200);
     assert_eq!(turns_unheard(&mut bench, 60, true, 92_200), (true, false));
 }
+
+/// Not led, turned by hand at 300 rpm in one direction: 327 pulses a millisecond.
+fn turn_by_hand(bench: &mut Bench, ms: u64, direction: i32) {
+    for _ in 0..ms {
+        bench.raw[0] += 327 * direction;
+        bench.run(1);
+    }
+}
+
+#[test]
+fn a_joint_turned_fast_by_hand_keeps_its_zero_in_a_silence_that_its_last_rate_explains() {
+    for direction in [1, -1] {
+        // 0.4 turns in 80 ms are 300 rpm, and a full turn is 750 rpm.
+        for (pulses, is_lost) in [(26_214, false), (65_536, true)] {
+            let mut bench = homed();
+            bench.run(500);
+            turn_by_hand(&mut bench, 60, direction);
+            assert_eq!((bench.state(0).is_driven, bench.state(0).position_jumps), (false, 0));
+            let raw = bench.raw[0] + pulses * direction;
+            assert_eq!(turns_unheard(&mut bench, 80, false, raw), (is_lost, !is_lost), "{pulses}");
+            assert_eq!(bench.state(0).position_jumps, u16::from(is_lost));
+        }
+    }
+}
+
+#[test]
+fn a_joint_that_was_turned_by_hand_and_stands_again_has_no_rate_left() {
+    for pause_ms in [0, 30] {
+        let mut bench = homed();
+        bench.run(500);
+        turn_by_hand(&mut bench, 60, 1);
+        bench.silent = std::vec![1];
+        turn_by_hand(&mut bench, pause_ms, 1);
+        bench.silent.clear();
+        turn_by_hand(&mut bench, 30, 1);
+        bench.run(200);
+        let raw = bench.raw[0] + 26_214;
+        assert_eq!(turns_unheard(&mut bench, 80, false, raw), (true, false), "{pause_ms}");
+    }
+}
+
+#[test]
+fn two_positions_at_once_may_be_a_sixteenth_of_a_turn_apart() {
+    for (pulses, jumps) in [(4_096, 0), (-4_096, 0), (4_097, 1), (-4_097, 1)] {
+        let mut bench = homed();
+        bench.run(500);
+        bench.hear(Register::ActualPosition, 0);
+        bench.hear(Register::ActualPosition, pulses);
+        assert_eq!(bench.state(0).position_jumps, jumps, "{pulses}");
+        let health = bench.joints.health(bench.handles[0]).unwrap();
+        assert_eq!(health.ambiguous_gaps, jumps, "{health}");
+    }
+}
+
+#[test]
+fn a_zero_set_while_the_joint_is_offline_is_uncertain_until_it_is_back() {
+    let mut bench = Bench::new(&[1]);
+    bench.run(30);
+    bench.silent = std::vec![1];
+    bench.run(60);
+    assert_eq!(bench.state(0).link, Link::Late);
+    assert_eq!(bench.joints.zero(bench.handles[0]), Err(TargetError::NoFeedback));
+    bench.run(100);
+    assert_eq!(bench.state(0).link, Link::Offline);
+    assert_eq!(bench.joints.zero(bench.handles[0]), Err(TargetError::NoFeedback));
+    for _ in 0..20 {
+        bench.joints.set_offset(bench.handles[0], 100).unwrap();
+        bench.run(1);
+        assert_eq!(bench.state(0).homing, Homing::Uncertain);
+    }
+    bench.silent.clear();
+    bench.run(100);
+    bench.joints.zero(bench.handles[0]).unwrap();
+    bench.run(100);
+    assert_eq!(bench.state(0).homing, Homing::Homed);
+}
+
+#[test]
+fn a_joint_is_there_within_a_64th_of_a_turn_and_stands_within_a_256th() {
+    for (pulses, stalls) in [(1_024, false), (1_025, true), (-1_024, false), (-1_025, true)] {
+        let mut bench = jaw(Reaction::Report);
+        assert_eq!(run_to(&mut bench, pulses, 600, true).len(), usize::from(stalls), "{pulses}");
+    }
+    for (pulses, stalls) in [(256, true), (257, false), (-256, true), (-257, false)] {
+        let mut bench = jaw(Reaction::Report);
+        assert_eq!(run_to(&mut bench, 30_000, 250, true), []);
+        bench.raw[0] = pulses;
+        assert_eq!(run_to(&mut bench, 30_000, 200, true).len(), usize::from(stalls), "{pulses}");
+    }
+}
+
+/// From rest, it makes 900 or 1125 pulses in 300 ms; a 64th of a turn is 1024.
+#[test]
+fn a_joint_that_speeds_up_too_slowly_for_a_visible_motion_is_not_checked() {
+    for (acceleration, is_checked) in [(20_000, false), (25_000, true)] {
+        let mut bench = Bench::new(&[]);
+        let config = Config::new(1)
+            .with_stall(Duration::from_millis(300), Reaction::Report)
+            .with_acceleration(acceleration);
+        bench.handles.push(bench.joints.attach(config).unwrap());
+        bench.run(10);
+        bench.joints.arm(at_ms(bench.ms)).unwrap();
+        let seen = run_to(&mut bench, 30_000, 900, true);
+        assert_eq!(seen.len(), usize::from(is_checked), "{acceleration}");
+    }
+}

@@ -256,3 +256,17 @@ fn frames_that_were_ready_are_sent_superseded_or_wait() {
     assert!(given_back > 50 && superseded > given_back);
     assert_eq!(packed, taken - given_back + superseded + waiting);
 }
+
+#[test]
+fn an_update_has_at_least_one_frame_of_a_kind_and_at_most_twelve() {
+    for (wanted, each) in [(0, 1), (1, 1), (11, 11), (12, 12), (13, 12), (255, 12)] {
+        let joints = Joints::new().with_frames_per_update(wanted, wanted);
+        assert_eq!(joints.load().frames_per_s(), 3_000 * each);
+        let mut bench = Bench { joints, ..Bench::new(&[]) };
+        bench.handles = ALL.map(|id| bench.joints.attach(Config::new(id)).unwrap()).to_vec();
+        bench.run(200);
+        bench.joints.arm(at_ms(bench.ms)).unwrap();
+        bench.drive(10);
+        assert_eq!(bench.drive(10).len(), 2 * each as usize * 10, "{wanted}");
+    }
+}

@@ -302,3 +302,120 @@ fn a_relaxed_joint_is_told_again_each_100_ms_by_updates_without_a_step() {
     let sent: Vec<_> = (0..350).flat_map(|_| held(&mut bench, 3, 1)).collect();
     assert_eq!(sent, [(3, Command::DISABLE); 4]);
 }
+
+/// Silence about a reply ends by the clock; where the clock stands, each update counts for a millisecond.
+#[test]
+fn a_joint_that_owes_an_answer_is_disabled_by_updates_without_a_step_once_its_time_is_over() {
+    for (step_us, updates) in [(0, 3), (100, 21), (1_000, 3), (1_500, 2)] {
+        let mut bench = Bench::armed(&[3]);
+        bench.drive(20);
+        bench.silent = std::vec![3];
+        while bench.joints.awaited(bench.handles[0]).is_none() {
+            bench.drive(1);
+        }
+        let asked = at_ms(bench.ms);
+        for update in 1..=updates {
+            let now = asked + Duration::from_micros(step_us * update);
+            bench.joints.update(Tick::new(now, f32::NAN));
+            let sent = bench.take();
+            let expected = if update == updates { &[(3, Command::DISABLE)][..] } else { &[] };
+            assert_eq!(sent, expected, "{step_us} us, update {update}");
+        }
+    }
+}
+
+#[test]
+fn disarming_disables_also_joints_without_a_target_and_once() {
+    let mut bench = Bench::armed(&[3, 5]);
+    bench.joints.disarm();
+    assert_eq!(bench.take(), [(3, Command::DISABLE), (5, Command::DISABLE)]);
+    bench.joints.disarm();
+    assert_eq!(bench.take(), []);
+}
+
+/// As one of several devices of a runner, joints are reached by their trait alone.
+#[test]
+fn a_trip_of_the_whole_robot_disables_the_joints_until_the_request_to_arm_is_released() {
+    let mut bench = Bench::armed(&[3, 5]);
+    bench.drive(50);
+    assert_eq!(crate::motor::CanDevice::superseded(&bench.joints), 0);
+    bench.ms += 1;
+    crate::motor::CanDevice::update(&mut bench.joints, Tick::new(at_ms(bench.ms), 0.001));
+    crate::motor::CanDevice::trip(&mut bench.joints);
+    // The write that waited is not sent.
+    assert_eq!(crate::motor::CanDevice::superseded(&bench.joints), 1);
+    let frame = crate::motor::CanDevice::next_frame(&mut bench.joints).unwrap();
+    assert_eq!(Some(frame), Command::DISABLE.frame(3));
+    assert!(bench.take().contains(&(5, Command::DISABLE)));
+    assert_eq!(bench.handles.iter().find(|joint| bench.joints.is_joint_armed(**joint)), None);
+    assert_eq!(bench.joints.arm(at_ms(bench.ms)), Err(ArmError::NotReleased));
+    bench.run(100);
+    assert_eq!(bench.joints.arm(at_ms(bench.ms)), Ok(()));
+    assert!(bench.handles.iter().all(|joint| bench.joints.is_joint_armed(*joint)));
+}
+
+/// Has joints 3 and 5 written to and asked; returns the frames.
+fn all_of_an_update(bench: &mut Bench) -> Vec<CanFrame> {
+    bench.ms += 1;
+    bench.joints.update(Tick::new(at_ms(bench.ms), 0.001));
+    core::iter::from_fn(|| bench.joints.next_frame()).collect()
+}
+
+/// Joints 3 and 5, both written to and asked in each update.
+fn two_at_once() -> Bench {
+    let joints = Joints::new().with_frames_per_update(2, 2);
+    let mut bench = Bench { joints, ..Bench::new(&[]) };
+    bench.handles = [3, 5].map(|id| bench.joints.attach(Config::new(id)).unwrap()).to_vec();
+    bench.run(30);
+    bench.joints.arm(at_ms(bench.ms)).unwrap();
+    bench.drive(20);
+    bench
+}
+
+#[test]
+fn a_write_that_comes_back_before_its_joint_is_relaxed_is_not_sent_again() {
+    let mut bench = two_at_once();
+    let frames = all_of_an_update(&mut bench);
+    assert_eq!(frames.len(), 4);
+    assert!(frames.iter().all(|frame| bench.joints.requeue(frame)));
+    bench.joints.relax(bench.handles[0]);
+    let sent = bench.run(1);
+    let write = Command::Write(Register::Position, 1_000);
+    assert_eq!(writes(&sent), [Command::DISABLE, write]);
+    assert!(sent.contains(&(3, Command::DISABLE)) && sent.contains(&(5, write)));
+    assert!(bench.run(20).iter().all(|(id, command)| *id == 5 || command.is_safe()));
+}
+
+#[test]
+fn a_detached_joint_is_disabled_once_and_not_asked_whatever_waits_or_comes_back() {
+    let detached = |end: fn(&mut Bench)| {
+        let mut bench = two_at_once();
+        end(&mut bench);
+        let sent = bench.run(10);
+        let of_first: Vec<_> = sent.iter().filter(|(id, _)| *id == 3).map(|sent| sent.1).collect();
+        let asked = sent.iter().filter(|(id, command)| *id == 5 && command.is_safe()).count();
+        (of_first, asked)
+    };
+    let once = (std::vec![Command::DISABLE], 10);
+    // Its frames wait.
+    let waits = detached(|bench| {
+        bench.ms += 1;
+        bench.joints.update(Tick::new(at_ms(bench.ms), 0.001));
+        bench.joints.detach(bench.handles[0]);
+    });
+    assert_eq!(waits, once);
+    // They came back.
+    let returned = detached(|bench| {
+        let frames = all_of_an_update(bench);
+        assert!(frames.iter().all(|frame| bench.joints.requeue(frame)));
+        bench.joints.detach(bench.handles[0]);
+    });
+    assert_eq!(returned, once);
+    // They come back afterwards.
+    let returns = detached(|bench| {
+        let frames = all_of_an_update(bench);
+        bench.joints.detach(bench.handles[0]);
+        assert!(frames.iter().all(|frame| bench.joints.requeue(frame)));
+    });
+    assert_eq!(returns, once);
+}
