@@ -180,11 +180,13 @@ fn an_enable_that_comes_back_after_a_disable_is_not_sent_before_the_bring_up() {
 }
 
 /// Other values than those of a joint without settings.
-const HEAVY: Config = Config::new(4)
-    .with_mode(3)
-    .with_current(1_500)
-    .with_acceleration(400_000)
-    .with_deceleration(300_000);
+fn heavy() -> Config {
+    Config::new(4)
+        .with_mode(3)
+        .with_current(1_500)
+        .with_acceleration(400_000)
+        .with_deceleration(300_000)
+}
 
 const HEAVY_WRITES: [Command; 4] = [
     Command::Write(Register::Mode, 3),
@@ -195,10 +197,10 @@ const HEAVY_WRITES: [Command; 4] = [
 
 #[test]
 fn a_joint_is_brought_up_with_the_settings_of_its_configuration() {
-    let told = (HEAVY.mode(), HEAVY.current(), HEAVY.acceleration(), HEAVY.deceleration());
+    let told = (heavy().mode(), heavy().current(), heavy().acceleration(), heavy().deceleration());
     assert_eq!(told, (3, 1_500, 400_000, 300_000));
     let mut bench = Bench::new(&[]);
-    bench.handles.push(bench.joints.attach(HEAVY).unwrap());
+    bench.handles.push(bench.joints.attach(heavy()).unwrap());
     bench.run(30);
     bench.joints.arm(at_ms(bench.ms)).unwrap();
     assert_eq!(writes(&bench.drive(4)), HEAVY_WRITES);
@@ -209,12 +211,12 @@ fn settings_of_a_joint_that_moves_are_written_once_and_unusable_ones_never() {
     let mut bench = Bench::armed(&[4]);
     let joint = bench.handles[0];
     bench.drive(20);
-    bench.joints.set_settings(joint, &HEAVY).unwrap();
+    bench.joints.set_settings(joint, &heavy()).unwrap();
     assert_eq!(writes(&bench.drive(4)), HEAVY_WRITES);
     let unusable = [
-        (HEAVY.with_current(0), "current"),
-        (HEAVY.with_acceleration(0), "acceleration"),
-        (HEAVY.with_deceleration(-1), "deceleration"),
+        (heavy().with_current(0), "current"),
+        (heavy().with_acceleration(0), "acceleration"),
+        (heavy().with_deceleration(-1), "deceleration"),
     ];
     for (config, parameter) in unusable {
         let refused = bench.joints.set_settings(joint, &config).unwrap_err().to_string();

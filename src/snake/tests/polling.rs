@@ -270,3 +270,69 @@ fn an_update_has_at_least_one_frame_of_a_kind_and_at_most_twelve() {
         assert_eq!(bench.drive(10).len(), 2 * each as usize * 10, "{wanted}");
     }
 }
+
+/// Has joints 3 and 5 written to and asked; returns the frames.
+fn all_of_an_update(bench: &mut Bench) -> Vec<CanFrame> {
+    bench.ms += 1;
+    bench.joints.update(Tick::new(at_ms(bench.ms), 0.001));
+    core::iter::from_fn(|| bench.joints.next_frame()).collect()
+}
+
+/// Joints 3 and 5, both written to and asked in each update.
+fn two_at_once() -> Bench {
+    let joints = Joints::new().with_frames_per_update(2, 2);
+    let mut bench = Bench { joints, ..Bench::new(&[]) };
+    bench.handles = [3, 5].map(|id| bench.joints.attach(Config::new(id)).unwrap()).to_vec();
+    bench.run(30);
+    bench.joints.arm(at_ms(bench.ms)).unwrap();
+    bench.drive(20);
+    bench
+}
+
+#[test]
+fn a_write_that_comes_back_before_its_joint_is_relaxed_is_not_sent_again() {
+    let mut bench = two_at_once();
+    let frames = all_of_an_update(&mut bench);
+    assert_eq!(frames.len(), 4);
+    assert!(frames.iter().all(|frame| bench.joints.requeue(frame)));
+    bench.joints.relax(bench.handles[0]);
+    let sent = bench.run(1);
+    let write = Command::Write(Register::Position, 1_000);
+    assert_eq!(writes(&sent), [Command::DISABLE, write]);
+    assert!(sent.contains(&(3, Command::DISABLE)) && sent.contains(&(5, write)));
+    assert!(bench.run(20).iter().all(|(id, command)| *id == 5 || command.is_safe()));
+}
+
+#[test]
+fn a_detached_joint_is_disabled_once_and_not_asked_whatever_waits_or_comes_back() {
+    let detached = |end: fn(&mut Bench)| {
+        let mut bench = two_at_once();
+        end(&mut bench);
+        let sent = bench.run(10);
+        let of_first: Vec<_> = sent.iter().filter(|(id, _)| *id == 3).map(|sent| sent.1).collect();
+        let asked = sent.iter().filter(|(id, command)| *id == 5 && command.is_safe()).count();
+        (of_first, asked)
+    };
+    let once = (std::vec![Command::DISABLE], 10);
+    // Its frames wait.
+    let waits = detached(|bench| {
+        bench.ms += 1;
+        bench.joints.update(Tick::new(at_ms(bench.ms), 0.001));
+        bench.joints.detach(bench.handles[0]);
+    });
+    assert_eq!(waits, once);
+    // They came back.
+    let returned = detached(|bench| {
+        let frames = all_of_an_update(bench);
+        assert!(frames.iter().all(|frame| bench.joints.requeue(frame)));
+        bench.joints.detach(bench.handles[0]);
+    });
+    assert_eq!(returned, once);
+    // They come back afterwards.
+    let returns = detached(|bench| {
+        let frames = all_of_an_update(bench);
+        bench.joints.detach(bench.handles[0]);
+        assert!(frames.iter().all(|frame| bench.joints.requeue(frame)));
+    });
+    assert_eq!(returns, once);
+}

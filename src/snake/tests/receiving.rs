@@ -34,3 +34,137 @@ fn what_is_no_reply_is_refused_counted_and_keeps_nothing_fresh() {
     assert_eq!((counters.foreign_commands, counters.unattached), (2, 1));
     assert_eq!(bench.state(0).bad_replies, 5);
 }
+
+/// Armed, homed at `pulses` from where its drive counts, and driven there for 30 ms.
+fn homed() -> Bench {
+    let mut bench = Bench::armed(&[1]);
+    bench.joints.set_offset(bench.handles[0], -65_536).unwrap();
+    bench.joints.set_speed(bench.handles[0], AngularVelocity::from_rpm(200.0)).unwrap();
+    for _ in 0..30 {
+        bench.joints.set_pulses(bench.handles[0], 0).unwrap();
+        bench.run(1);
+    }
+    assert!(bench.state(0).is_driven);
+    bench
+}
+
+/// Reports another position after a time in which nothing was heard, and not even an update was made if `is_stalled`. Returns whether the
+/// zero counts as lost, and whether the joint is enabled again by targets.
+fn turns_unheard(bench: &mut Bench, silent_ms: u64, is_stalled: bool, raw: i32) -> (bool, bool) {
+    if is_stalled {
+        bench.ms += silent_ms;
+    } else {
+        bench.silent = std::vec![1];
+        bench.run(silent_ms);
+        bench.silent.clear();
+    }
+    bench.raw[0] = raw;
+    bench.hear(Register::ActualPosition, raw);
+    let sent = bench.drive(100);
+    let is_enabled = sent.contains(&(1, Command::Write(Register::Enable, 1)));
+    (bench.state(0).homing == Homing::Uncertain, is_enabled)
+}
+
+#[test]
+fn a_zero_is_lost_in_a_silence_of_which_a_stalled_loop_knows_nothing() {
+    assert_eq!(turns_unheard(&mut homed(), 900, true, 61_000), (true, false));
+    assert_eq!(turns_unheard(&mut homed(), 101, true, 0), (true, false), "as an offline joint");
+    assert!(!turns_unheard(&mut homed(), 99, true, 0).0);
+}
+
+#[test]
+fn a_joint_that_is_not_led_does_not_turn_to_a_target_of_before() {
+    let mut bench = homed();
+    bench.run(500);
+    assert!(!bench.state(0).is_driven);
+    assert_eq!(turns_unheard(&mut bench, 80, false, 27_000), (true, false));
+    // Led, the joint may be on the way.
+    assert!(!turns_unheard(&mut homed(), 80, false, 27_000).0);
+}
+
+#[test]
+fn two_positions_at_once_after_one_that_waited_are_no_great_speed() {
+    let mut bench = homed();
+    bench.run(500);
+    bench.ms += 35;
+    bench.hear(Register::ActualPosition, 100);
+    bench.ms += 1;
+    bench.hear(Register::ActualPosition, 2_200);
+    assert_eq!(turns_unheard(&mut bench, 60, true, 92_200), (true, false));
+}
+
+/// Not led, turned by hand at 300 rpm in one direction: 327 pulses a millisecond.
+fn turn_by_hand(bench: &mut Bench, ms: u64, direction: i32) {
+    for _ in 0..ms {
+        bench.raw[0] += 327 * direction;
+        bench.run(1);
+    }
+}
+
+#[test]
+fn a_joint_turned_fast_by_hand_keeps_its_zero_in_a_silence_that_its_last_rate_explains() {
+    for direction in [1, -1] {
+        // 0.4 turns in 80 ms are 300 rpm, and a full turn is 750 rpm.
+        for (pulses, is_lost) in [(26_214, false), (65_536, true)] {
+            let mut bench = homed();
+            bench.run(500);
+            turn_by_hand(&mut bench, 60, direction);
+            assert_eq!((bench.state(0).is_driven, bench.state(0).position_jumps), (false, 0));
+            let raw = bench.raw[0] + pulses * direction;
+            assert_eq!(turns_unheard(&mut bench, 80, false, raw), (is_lost, !is_lost), "{pulses}");
+            assert_eq!(bench.state(0).position_jumps, u16::from(is_lost));
+        }
+    }
+}
+
+#[test]
+fn a_joint_that_was_turned_by_hand_and_stands_again_has_no_rate_left() {
+    for pause_ms in [0, 30] {
+        let mut bench = homed();
+        bench.run(500);
+        turn_by_hand(&mut bench, 60, 1);
+        bench.silent = std::vec![1];
+        turn_by_hand(&mut bench, pause_ms, 1);
+        bench.silent.clear();
+        turn_by_hand(&mut bench, 30, 1);
+        bench.run(200);
+        let raw = bench.raw[0] + 26_214;
+        assert_eq!(turns_unheard(&mut bench, 80, false, raw), (true, false), "{pause_ms}");
+    }
+}
+
+#[test]
+fn two_positions_at_once_may_be_a_sixteenth_of_a_turn_apart() {
+    for (pulses, jumps) in [(4_096, 0), (-4_096, 0), (4_097, 1), (-4_097, 1)] {
+        let mut bench = homed();
+        bench.run(500);
+        bench.hear(Register::ActualPosition, 0);
+        bench.hear(Register::ActualPosition, pulses);
+        assert_eq!(bench.state(0).position_jumps, jumps, "{pulses}");
+        let health = bench.joints.health(bench.handles[0]).unwrap();
+        assert_eq!(health.ambiguous_gaps, jumps, "{health}");
+    }
+}
+
+#[test]
+fn a_zero_set_while_the_joint_is_offline_is_uncertain_until_it_is_back() {
+    let mut bench = Bench::new(&[1]);
+    bench.run(30);
+    bench.silent = std::vec![1];
+    bench.run(60);
+    assert_eq!(bench.state(0).link, Link::Late);
+    assert_eq!(bench.joints.zero(bench.handles[0]), Err(TargetError::NoFeedback));
+    bench.run(100);
+    assert_eq!(bench.state(0).link, Link::Offline);
+    assert_eq!(bench.joints.zero(bench.handles[0]), Err(TargetError::NoFeedback));
+    for _ in 0..20 {
+        bench.joints.set_offset(bench.handles[0], 100).unwrap();
+        bench.run(1);
+        assert_eq!(bench.state(0).homing, Homing::Uncertain);
+    }
+    bench.silent.clear();
+    bench.run(100);
+    bench.joints.zero(bench.handles[0]).unwrap();
+    bench.run(100);
+    assert_eq!(bench.state(0).homing, Homing::Homed);
+}
