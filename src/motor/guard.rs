@@ -2,11 +2,23 @@
 
 use super::age;
 use super::safety::{DeviceGuard, MotorGuard, OPENING};
+use crate::math::limited;
 use crate::motor::{Link, TargetError, Timeouts};
 use crate::time::{Duration, Instant};
 
 /// After a silence of so long a drive may have started again, in µs.
 pub(super) const SILENCE_US: u32 = 100_000;
+
+/// Feedback may have waited in a buffer for so long, in s.
+const WAITED_S: f32 = 0.04;
+
+/// Returns the largest way in rad of a shaft between two readings so many s apart: at this velocity in rad/s for a little longer than that,
+/// or with a speed limit toward a target as far away; beside that 8 rad/s, for a shaft that sped up and stopped meanwhile.
+pub(crate) fn furthest(gap_s: f32, velocity: f32, (to_target, speed): (f32, f32)) -> f32 {
+    let time_s = limited(gap_s, WAITED_S, f32::MAX);
+    let asked = limited(speed * time_s, 0.0, to_target);
+    8.0 * gap_s + limited(1.5 * velocity * time_s, asked, f32::MAX)
+}
 
 /// Decides whether one motor may be driven: for motors outside the families of this crate.
 ///

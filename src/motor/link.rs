@@ -1,7 +1,6 @@
 //! The link to a motor, the ages at which feedback and commands count as lost, and the stamps by which ages are known.
 
 use crate::error::ConfigError;
-use crate::math::limited;
 use crate::time::{Duration, Instant};
 
 /// Whether a motor is heard.
@@ -202,17 +201,6 @@ pub(crate) const fn is_near(now: u32, stamp: u32, limit: u32) -> bool {
 pub(crate) const fn age(now: u32, stamp: u32) -> u32 {
     let age = now.wrapping_sub(stamp);
     if age.cast_signed() < 0 { 0 } else { age }
-}
-
-/// Feedback may have waited in a buffer for so long, in s.
-const WAITED_S: f32 = 0.04;
-
-/// Returns the largest way in rad of a shaft between two readings so many s apart: at this velocity in rad/s for a little longer than that,
-/// or with a speed limit toward a target as far away; beside that 8 rad/s, for a shaft that sped up and stopped meanwhile.
-pub(crate) fn furthest(gap_s: f32, velocity: f32, (to_target, speed): (f32, f32)) -> f32 {
-    let time_s = limited(gap_s, WAITED_S, f32::MAX);
-    let asked = limited(speed * time_s, 0.0, to_target);
-    8.0 * gap_s + limited(1.5 * velocity * time_s, asked, f32::MAX)
 }
 
 /// Returns the age of a stamp, which is brought to `now` if the clock went back behind it.

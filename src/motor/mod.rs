@@ -84,13 +84,14 @@ pub use devices::Devices;
 pub(crate) use devices::ask;
 pub use drive::{AngleDrive, Measured, OneOf, TargetError, VelocityDrive};
 pub use guard::Guard;
+pub(crate) use guard::furthest;
 pub use health::{Condition, Conditions, Health, HealthConfig, Reaction};
 pub(crate) use health::{
     Journal, Latch, Monitor, Rival, Sample, Severity, Traffic, check_soft_limits, elapsed,
 };
 pub use homing::{HomingStep, StopHoming};
 pub use link::{Link, Timeouts};
-pub(crate) use link::{age, furthest, is_near, take_age};
+pub(crate) use link::{age, is_near, take_age};
 pub use load::BusLoad;
 pub use safety::OPENING;
 pub(crate) use safety::{DeviceGuard, Guarded, Hold, MotorGuard, Repeat, Rest};
