@@ -10,8 +10,8 @@ use crate::motor::{Condition, Guard, Link, MotorName, Rival, Timeouts, Traffic};
 use crate::time::{Duration, Instant};
 use core::f32::consts::TAU;
 
-/// A relaxed joint is disabled again after this time: its drive may have missed the frame.
-const KEEP_RELAXED: Duration = Duration::from_millis(100);
+/// A relaxed joint is disabled again after this time, a driven joint told its target: the drive may have missed the frame.
+const REMIND: Duration = Duration::from_millis(100);
 /// Tolerance between two positions in rad: a sixteenth of a turn.
 const JUMP: f32 = TAU / 16.0;
 /// One of so many speed requests is replaced by a check that the drive is still enabled.
@@ -72,7 +72,7 @@ pub(super) struct Slot {
     driven: bool,
     /// The same at the last position.
     was_driven: bool,
-    stopped: Instant,
+    told_at: Instant,
     turn: u8,
     pub(super) question: Option<Register>,
     pub(super) answer: Option<(Register, i32)>,
@@ -115,7 +115,7 @@ impl Slot {
         ahead: 0,
         driven: false,
         was_driven: false,
-        stopped: Instant::START,
+        told_at: Instant::START,
         turn: 0,
         question: None,
         answer: None,
@@ -188,15 +188,19 @@ impl Slot {
         }
     }
 
-    /// Tells whether a driven joint has a changed value to write, beside periodic refreshes.
+    /// Tells whether a driven joint has a value to write, beside periodic refreshes.
     pub(super) const fn has_news(&self) -> bool {
         self.driven && self.pending != 0
     }
 
     /// Tells whether a relaxed joint must be disabled again.
     pub(super) fn wants_reminder(&self, now: Instant) -> bool {
-        // After a set-back of the clock, the time of the last disable lies ahead.
-        !self.driven && (now.since(self.stopped) >= KEEP_RELAXED || now < self.stopped)
+        !self.driven && self.is_forgotten(now)
+    }
+
+    fn is_forgotten(&self, now: Instant) -> bool {
+        // After a set-back of the clock, the time of the last write lies ahead.
+        now.since(self.told_at) >= REMIND || now < self.told_at
     }
 
     pub(super) const fn is_driven(&self) -> bool {
@@ -290,14 +294,14 @@ impl Slot {
 impl Slot {
     /// Notes a disable at `now`. With a new target, the joint is then brought up from the beginning.
     pub(super) const fn told_to_relax(&mut self, now: Instant) {
-        self.stopped = now;
+        self.told_at = now;
         (self.pending, self.ahead) = (ALL, ALL);
     }
 
     /// Returns the next frame to write.
     pub(super) fn next_write(&mut self, now: Instant) -> Command {
+        self.told_at = now;
         if !self.driven {
-            self.stopped = now;
             return Command::DISABLE;
         }
         // In turns, so that no register waits for endless changes of another.

@@ -90,8 +90,8 @@ const TIMES_OF_DRIVES: [(&str, &str, &str); 23] = [
         "in an update without a step, no time for a reply passes",
     ),
     ("snake/schedule.rs", "passed > timeout", "a reply that does not come is not waited for"),
-    ("snake/slot.rs", "KEEP_RELAXED", "a disable is sent again: a drive may have missed it"),
-    ("snake/slot.rs", "now < self . stopped", "the same after a set-back of the clock"),
+    ("snake/slot.rs", "REMIND", "a disable or a target is sent again: a drive may have missed it"),
+    ("snake/slot.rs", "now < self . told_at", "the same after a set-back of the clock"),
     ("snake/slot/health.rs", "RATE_SPAN", "the span of a rate"),
     ("snake/slot/health.rs", "window", "a joint that does not move, as its configuration says"),
     (
@@ -257,7 +257,7 @@ const OWN_NAMES: [(&str, &str, &[&str]); 26] = [
         "the core is asked for each joint",
         &["foreign_commands", "has_rival", "hear_rival", "hold", "rival"],
     ),
-    ("snake", "times of the last position and of the last disable", &["heard", "stopped"]),
+    ("snake", "the time of the last position", &["heard"]),
     ("snake", "a drive in an unexpected state has lost its zero", &["lose_zero"]),
     (
         "snake",

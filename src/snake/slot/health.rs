@@ -170,6 +170,9 @@ fn check(slot: &mut Slot, is_stalled: bool, now: Instant) {
         slot.guard.relax_until_armed();
     }
     slot.guard.note(Condition::Stalled, is_stalled, now);
+    if slot.driven && slot.is_forgotten(now) {
+        slot.renew(Register::Position);
+    }
     slot.traffic.add(slot.guard.take_in_time());
     if slot.traffic.end_window(&mut slot.window_from, now) {
         slot.guard.trust(0);

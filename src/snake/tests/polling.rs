@@ -336,3 +336,33 @@ fn a_detached_joint_is_disabled_once_and_not_asked_whatever_waits_or_comes_back(
     });
     assert_eq!(returns, once);
 }
+
+/// Without its turn, a joint that missed its last target would stay where it is as long as another one moves.
+#[test]
+fn a_target_that_does_not_change_is_repeated_beside_one_that_changes_in_each_update() {
+    for (writes, room) in [(1, usize::MAX), (2, 1)] {
+        let joints = Joints::new().with_frames_per_update(1, writes);
+        let mut bench = Bench { joints, ..Bench::new(&[]) };
+        bench.handles =
+            [1, 2, 3, 4].map(|id| bench.joints.attach(Config::new(id)).unwrap()).to_vec();
+        bench.run(30);
+        bench.joints.arm(at_ms(bench.ms)).unwrap();
+        bench.drive(60);
+        let mut written = [0; 4];
+        for tick in 0..400 {
+            bench.ms += 1;
+            for (joint, pulses) in
+                bench.handles.clone().into_iter().zip([tick, 1_000, 1_000, 1_000])
+            {
+                bench.joints.set_pulses(joint, pulses).unwrap();
+            }
+            bench.joints.update(Tick::new(at_ms(bench.ms), 0.001));
+            for (id, command) in take_some(&mut bench, room, false) {
+                let is_target = matches!(command, Command::Write(Register::Position, _));
+                written[usize::from(id - 1)] += u32::from(is_target);
+            }
+        }
+        let [moving, holding @ ..] = written;
+        assert!(moving > 90 && holding.iter().all(|count| *count >= 3), "{writes}: {written:?}");
+    }
+}
