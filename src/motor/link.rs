@@ -13,7 +13,7 @@ pub enum Link {
     Unheard,
     /// Fresh feedback.
     Online,
-    /// The last feedback is older than [`Timeouts::late`]: zero output, integrators frozen as long as the target is kept. Clears itself.
+    /// The last feedback is older than [`Timeouts::late`]: zero output; the integrators of a motor with a target are frozen. Clears itself.
     Late,
     /// The last feedback is older than [`Timeouts::offline`]: relaxed, latched.
     Offline,

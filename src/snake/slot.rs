@@ -300,8 +300,8 @@ impl Slot {
 
     /// Returns the next frame to write.
     pub(super) fn next_write(&mut self, now: Instant) -> Command {
-        self.told_at = now;
         if !self.driven {
+            self.told_at = now;
             return Command::DISABLE;
         }
         // In turns, so that no register waits for endless changes of another.
@@ -312,6 +312,10 @@ impl Slot {
         self.ahead = bit.wrapping_neg() << 1;
         let register = Register::SEQUENCE.get(bit.trailing_zeros() as usize);
         let register = *register.unwrap_or(&Register::Position);
+        if register == Register::Position {
+            self.told_at = now;
+        }
+        self.was_driven |= bit == LAST;
         Command::Write(register, self.value(register))
     }
 

@@ -97,8 +97,8 @@ impl CurrentControl {
         };
         let torque = limited(wanted, -limit, limit);
         // Rounding of the quotient must not take it past the limit.
-        let most = model.current_limit_a * share;
-        let current = limited(model.current_of(torque), -most, most);
+        let most_current = model.current_limit_a * share;
+        let current = limited(model.current_of(torque), -most_current, most_current);
         Some((Command::Current(current), Some(torque / most)))
     }
 }

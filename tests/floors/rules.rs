@@ -59,7 +59,7 @@ const AGES: Seeds<'static> = Seeds {
 };
 
 /// Ages that a family compares with a limit: of the frames of its drives, none of a link or a target. File, words, reason.
-const TIMES_OF_DRIVES: [(&str, &str, &str); 23] = [
+const TIMES_OF_DRIVES: [(&str, &str, &str); 24] = [
     ("dji/outbox.rs", "self . keep_alive_us", "zero frames are sent again"),
     (
         "dji/slot/gap.rs",
@@ -93,6 +93,7 @@ const TIMES_OF_DRIVES: [(&str, &str, &str); 23] = [
     ("snake/slot.rs", "REMIND", "a disable or a target is sent again: a drive may have missed it"),
     ("snake/slot.rs", "now < self . told_at", "the same after a set-back of the clock"),
     ("snake/slot/health.rs", "RATE_SPAN", "the span of a rate"),
+    ("snake/slot/health.rs", "now < since", "the same after a set-back of the clock"),
     ("snake/slot/health.rs", "window", "a joint that does not move, as its configuration says"),
     (
         "motor/actuator/joint.rs",

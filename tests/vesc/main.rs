@@ -11,7 +11,8 @@ use drivetrain::encoder::GearRatio;
 use drivetrain::error::ConfigError;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    Actuator, AngleDrive, Condition, Devices, Ingest, TargetError, Timeouts, VelocityDrive,
+    Actuator, AngleDrive, Condition, Devices, DriveProtocol, Ingest, TargetError, Timeouts,
+    VelocityDrive,
 };
 use drivetrain::sim::Drive;
 use drivetrain::sim::DriveShaft;
@@ -163,6 +164,7 @@ fn each_mode_reaches_its_target_and_rests_afterwards() {
     let mut torque = Bench::armed(Mode::current());
     torque.steps(300, |bench| bench.own.set_torque(0.25).unwrap());
     assert!((torque.drive.shaft().torque_nm() - 0.25).abs() < 1e-4, "5 A of 0.05 Nm/A");
+    assert!((torque.own.motor().vitals().effort - 0.25).abs() < 1e-4, "5 A of 20 A");
     assert_eq!(torque.own.set_velocity((), wheel), Err(TargetError::Unsupported));
     rests(torque);
 

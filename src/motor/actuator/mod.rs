@@ -159,7 +159,8 @@ impl<M: DriveProtocol> Actuator<M> {
         Self { guard: self.guard.with_timeouts(timeouts), ..self }
     }
 
-    /// Sets the time in which the [share](Order::share) of the output rises from 0 to 1 after arming; 0.2 s at first.
+    /// Sets the time in which the [share](Order::share) of the output rises from 0 to 1 after arming, and after each rest without a target;
+    /// 0.2 s at first. With targets slower than the deadline, or feedback slower than *late*, the share stays near 0.
     #[must_use]
     pub fn with_opening(self, time: Duration) -> Self {
         Self { guard: self.guard.with_opening(time), ..self }

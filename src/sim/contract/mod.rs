@@ -58,7 +58,8 @@ pub trait Subject {
     }
 
     /// Returns the effort that a command asks of its motor, as a share of the largest, -1 to 1; `None`, the default, for a command
-    /// whose effort only the drive knows. Read the frame as the manual of the drive does: with `None`, nothing checks that rest is rest.
+    /// whose effort only the drive knows. Read the frame as the manual of the drive does: with `None`, nothing checks that rest is rest. A frame that is no
+    /// command, and a brake at rest, have none.
     fn effort(&self, command: &CanFrame) -> Option<f32> {
         let _ = command;
         None

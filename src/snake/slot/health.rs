@@ -40,7 +40,7 @@ impl Slot {
     fn receive_position(&mut self, raw: i32, now: Instant) {
         let gap_us = now.since(self.heard).micros_u32().unwrap_or(u32::MAX);
         if let (Some(before), Link::Online | Link::Late) = (self.raw, self.guard.link()) {
-            if self.guard.is_silence(gap_us) {
+            if self.guard.is_offline_by(gap_us) {
                 self.lose_zero(now);
                 self.guard.relax_until_armed();
             } else if way(before, raw) > furthest(self, before, gap_us as f32 * 1e-6) {
@@ -48,7 +48,7 @@ impl Slot {
                 self.distrust(now);
             }
         }
-        self.was_driven = self.driven;
+        self.was_driven = is_up(self);
         measure_rate(self, raw, now);
         if !self.guard.hear_in_time(now) {
             match self.raw {
@@ -131,7 +131,7 @@ fn way(one: i32, other: i32) -> f32 {
 
 /// Returns the largest way of a joint from a position, so many s after the position was heard: to its target, if led since.
 fn furthest(slot: &Slot, before: i32, gap_s: f32) -> f32 {
-    let is_led = slot.driven || slot.was_driven;
+    let is_led = is_up(slot) || slot.was_driven;
     let asked = if is_led { (way(before, slot.target), way(0, slot.speed)) } else { (0.0, 0.0) };
     JUMP + motor::furthest(gap_s, slot.rate, asked)
 }
@@ -139,8 +139,9 @@ fn furthest(slot: &Slot, before: i32, gap_s: f32) -> f32 {
 fn measure_rate(slot: &mut Slot, raw: i32, now: Instant) {
     let (before, since) = slot.marked;
     let span = now.since(since);
-    if slot.raw.is_none() || span >= RATE_SPAN {
-        slot.rate = if slot.raw.is_none() { 0.0 } else { way(before, raw) / span.as_secs_f32() };
+    let is_new = slot.raw.is_none() || now < since;
+    if is_new || span >= RATE_SPAN {
+        slot.rate = if is_new { 0.0 } else { way(before, raw) / span.as_secs_f32() };
         slot.marked = (raw, now);
     }
 }
@@ -179,6 +180,9 @@ fn check(slot: &mut Slot, is_stalled: bool, now: Instant) {
     }
     let is_well = !is_stalled && !has_rival(slot);
     slot.guard.wake_at(if is_well { slot.window_from + Traffic::WINDOW } else { now });
+    if slot.driven {
+        slot.guard.wake_at(slot.told_at + super::REMIND);
+    }
 }
 
 /// Tells whether a joint away from its target stands for too long: the joint is blocked, or its drive does not follow.

@@ -237,3 +237,37 @@ fn what_a_bring_up_writes_is_what_can_be_written() {
         assert_eq!(register.is_writable(), is_written, "{register:?}");
     }
 }
+
+#[test]
+fn a_target_is_repeated_after_100_ms_whatever_else_is_written_and_however_late_feedback_may_be() {
+    for (late_ms, command_ms) in [(40, 100), (200, 1_000), (1_000, 1_000)] {
+        let timeouts = Timeouts::POLLED
+            .with_feedback(Duration::from_millis(late_ms), Duration::from_millis(1_000))
+            .unwrap()
+            .with_command(Duration::from_millis(command_ms))
+            .unwrap();
+        let mut bench = Bench { joints: Joints::new().with_timeouts(timeouts), ..Bench::new(&[]) };
+        bench.handles = [1, 2].map(|id| bench.joints.attach(Config::new(id)).unwrap()).to_vec();
+        bench.run(30);
+        bench.joints.arm(at_ms(bench.ms)).unwrap();
+        bench.drive(60);
+        let (mut last, mut longest) = (bench.ms, 0);
+        for tick in 0..2_000_u16 {
+            let [first, second] = bench.handles[..] else { panic!() };
+            bench.joints.set_pulses(first, tick.into()).unwrap();
+            bench.joints.set_pulses(second, 1_000).unwrap();
+            let speed = AngularVelocity::from_rpm(50.0 + 0.05 * f32::from(tick));
+            bench.joints.set_speed(second, speed).unwrap();
+            for (id, command) in bench.run(1) {
+                if id == 2 && matches!(command, Command::Write(Register::Position, _)) {
+                    longest = longest.max(bench.ms - last);
+                    last = bench.ms;
+                }
+            }
+        }
+        assert!(
+            (90..=110).contains(&longest),
+            "late {late_ms}, command {command_ms}: {longest} ms"
+        );
+    }
+}

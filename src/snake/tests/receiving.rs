@@ -168,3 +168,83 @@ fn a_zero_set_while_the_joint_is_offline_is_uncertain_until_it_is_back() {
     bench.run(100);
     assert_eq!(bench.state(0).homing, Homing::Homed);
 }
+
+#[test]
+fn a_rate_does_not_outlast_a_set_back_of_the_clock() {
+    for set_back_ms in [0, 400] {
+        let mut bench = homed();
+        bench.run(500);
+        turn_by_hand(&mut bench, 60, 1);
+        bench.ms -= set_back_ms;
+        bench.run(300);
+        _ = bench.joints.arm(at_ms(bench.ms));
+        bench.run(10);
+        let raw = bench.raw[0] + 65_536 / 4;
+        assert_eq!(turns_unheard(&mut bench, 60, false, raw), (true, false), "{set_back_ms} ms");
+    }
+}
+
+#[test]
+fn a_joint_that_is_not_enabled_yet_is_not_led() {
+    let mut bench = homed();
+    bench.run(500);
+    bench.silent = std::vec![1];
+    bench.run(35);
+    bench.silent.clear();
+    bench.raw[0] += 12_500; // 1.2 rad
+    let sent = bench.drive(100);
+    assert_eq!(bench.state(0).homing, Homing::Uncertain);
+    assert!(!sent.contains(&(1, Command::Write(Register::Enable, 1))));
+}
+
+/// Led between two positions, with neither of them.
+#[test]
+fn a_joint_that_was_led_for_a_moment_may_have_gone_on_its_way() {
+    let patient = Timeouts::POLLED
+        .with_feedback(Duration::from_millis(200), Duration::from_millis(600))
+        .unwrap();
+    let joints = Joints::new().with_timeouts(patient).with_frames_per_update(1, 12);
+    let mut bench = Bench { joints, ..Bench::new(&[]) };
+    let fast = |id: &u8| Config::new(*id).with_speed(AngularVelocity::from_rpm(200.0));
+    bench.handles = ALL.iter().map(|id| bench.joints.attach(fast(id)).unwrap()).collect();
+    // 200 rpm are 1092 pulses in 5 ms.
+    let step = |bench: &mut Bench| {
+        bench.ms += 5;
+        bench.joints.update(Tick::new(at_ms(bench.ms), 0.005));
+        bench.raw[0] += 1_092 * bench.enabled[0];
+        bench.take();
+    };
+    (0..100).for_each(|_| step(&mut bench));
+    bench.joints.arm(at_ms(bench.ms)).unwrap();
+    for phase in 0..36 {
+        (0..60 + phase).for_each(|_| step(&mut bench));
+        for _ in 0..20 {
+            bench.joints.set_pulses(bench.handles[0], 6_553_600).unwrap();
+            step(&mut bench);
+        }
+        bench.joints.relax(bench.handles[0]);
+    }
+    assert!(bench.raw[0] > 100_000 && bench.state(0).position_jumps == 0, "{:?}", bench.state(0));
+}
+
+#[test]
+fn a_silence_within_the_configured_time_costs_no_zero() {
+    for (silent_ms, is_kept) in [(150, true), (790, true), (900, false)] {
+        let patient = Timeouts::POLLED
+            .with_feedback(Duration::from_millis(40), Duration::from_millis(800))
+            .unwrap();
+        let mut bench = Bench { joints: Joints::new().with_timeouts(patient), ..Bench::new(&[]) };
+        bench.handles = std::vec![bench.joints.attach(Config::new(1)).unwrap()];
+        bench.run(30);
+        bench.joints.arm(at_ms(bench.ms)).unwrap();
+        bench.joints.set_offset(bench.handles[0], -65_536).unwrap();
+        bench.run(30);
+        bench.silent = std::vec![1];
+        bench.run(silent_ms);
+        bench.silent.clear();
+        bench.run(50);
+        let is_armed = bench.joints.is_joint_armed(bench.handles[0]);
+        let is_homed = bench.state(0).homing == Homing::Homed;
+        assert_eq!((is_homed, is_armed), (is_kept, is_kept), "{silent_ms} ms");
+    }
+}
