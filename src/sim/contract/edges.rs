@@ -126,7 +126,7 @@ pub(super) fn wait<S: Subject>(mut run: Run<S>) -> Outcome {
     run.expect(rest.is_none(), rule)
 }
 
-/// A condition that comes and goes again and again before the reading is one edge each way.
+/// A condition that begins and ends again and again before the reading is one edge each way.
 pub(super) fn flood<S: Subject>(mut run: Run<S>) -> Outcome {
     let rule = Rule::EdgesDoNotFlood;
     for _ in 0..20 {

@@ -58,8 +58,8 @@ pub trait Subject {
     }
 
     /// Returns the effort that a command asks of its motor, as a share of the largest, -1 to 1; `None`, the default, for a command
-    /// whose effort only the drive knows. Read the frame as the manual of the drive does: with `None`, nothing checks that rest is rest. A frame that is no
-    /// command, and a brake at rest, have none.
+    /// whose effort only the drive knows, for a question, for a brake at rest. Read the frame as the manual of the drive does: with `None`, no
+    /// check finds a torque at rest.
     fn effort(&self, command: &CanFrame) -> Option<f32> {
         let _ = command;
         None
@@ -347,7 +347,7 @@ impl<S: Subject> Run<S> {
         Ok(output)
     }
 
-    /// Returns the size of the effort: 0 if not known, and endless for a number that is none.
+    /// Returns the size of the effort: 0 if unknown, and infinite for NaN.
     fn effort(&self, frame: &CanFrame) -> f32 {
         let effort = self.subject.effort(frame).unwrap_or(0.0).abs();
         if effort.is_nan() { f32::INFINITY } else { effort }
