@@ -180,9 +180,6 @@ fn check(slot: &mut Slot, is_stalled: bool, now: Instant) {
     }
     let is_well = !is_stalled && !has_rival(slot);
     slot.guard.wake_at(if is_well { slot.window_from + Traffic::WINDOW } else { now });
-    if slot.driven {
-        slot.guard.wake_at(slot.told_at + super::REMIND);
-    }
 }
 
 /// Tells whether a joint away from its target stands for too long: the joint is blocked, or its drive does not follow.
