@@ -257,9 +257,9 @@ impl<S: Subject> Run<S> {
         self.expect(driven, rule)
     }
 
-    /// Drives after there was no target: the drives may have to be enabled, and their output range to open.
+    /// Drives after there was no target: the drives may have to be enabled, and their output range begins to open.
     fn drive_again(&mut self, rule: Rule) -> Outcome {
-        for _ in 0..=self.subject.preparation_ms() + self.subject.opening_ms() {
+        for _ in 0..=self.subject.preparation_ms() + self.subject.opening_ms() / 10 {
             let is_taken = self.subject.drive(1.0).is_ok();
             self.expect(is_taken, rule)?;
             if self.step()?.driving > 0 {
