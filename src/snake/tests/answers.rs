@@ -1,4 +1,4 @@
-//! Who owes an answer, and until when.
+//! Outstanding replies and their time-out.
 
 use super::*;
 
@@ -210,8 +210,7 @@ fn a_silent_joint_is_stopped_by_the_first_update_after_ten_milliseconds_whatever
 {
     for (timeout_ms, waits_ms) in [(0, 1), (2, 3), (10, 11), (11, 11), (60_000, 11)] {
         let joints = Joints::new().with_reply_timeout(Duration::from_millis(timeout_ms));
-        let mut bench = Bench { joints, ..Bench::new(&[]) };
-        bench.joints.attach(Config::new(3)).unwrap();
+        let mut bench = Bench::of(joints, [Config::new(3)]);
         _ = ask(&mut bench);
         bench.joints.emergency_stop();
         bench.silent = std::vec![3];

@@ -24,8 +24,7 @@ fn zeroing_makes_the_present_position_zero_and_relaxes() {
 
 #[test]
 fn a_reversed_joint_turns_position_speed_and_target_around() {
-    let mut bench = Bench::new(&[]);
-    bench.handles.push(bench.joints.attach(Config::new(6).reversed()).unwrap());
+    let mut bench = Bench::of(Joints::new(), [Config::new(6).reversed()]);
     bench.raw = [16_384; 12];
     bench.run(10);
     let state = bench.state(0);
@@ -199,10 +198,7 @@ const HEAVY_WRITES: [Command; 4] = [
 fn a_joint_is_brought_up_with_the_settings_of_its_configuration() {
     let told = (heavy().mode(), heavy().current(), heavy().acceleration(), heavy().deceleration());
     assert_eq!(told, (3, 1_500, 400_000, 300_000));
-    let mut bench = Bench::new(&[]);
-    bench.handles.push(bench.joints.attach(heavy()).unwrap());
-    bench.run(30);
-    bench.joints.arm(at_ms(bench.ms)).unwrap();
+    let mut bench = Bench::of(Joints::new(), [heavy()]).armed_after(30);
     assert_eq!(writes(&bench.drive(4)), HEAVY_WRITES);
 }
 
@@ -246,10 +242,8 @@ fn a_target_is_repeated_after_100_ms_whatever_else_is_written() {
             .unwrap()
             .with_command(Duration::from_millis(command_ms))
             .unwrap();
-        let mut bench = Bench { joints: Joints::new().with_timeouts(timeouts), ..Bench::new(&[]) };
-        bench.handles = [1, 2].map(|id| bench.joints.attach(Config::new(id)).unwrap()).to_vec();
-        bench.run(30);
-        bench.joints.arm(at_ms(bench.ms)).unwrap();
+        let joints = Joints::new().with_timeouts(timeouts);
+        let mut bench = Bench::of(joints, [1, 2].map(Config::new)).armed_after(30);
         bench.drive(60);
         let (mut last, mut longest) = (bench.ms, 0);
         for tick in 0..2_000_u16 {

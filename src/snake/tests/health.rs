@@ -205,12 +205,8 @@ fn run_to(bench: &mut Bench, pulses: i32, ms: u64, blocked: bool) -> Vec<(Condit
 }
 
 fn jaw(reaction: Reaction) -> Bench {
-    let mut bench = Bench::new(&[]);
     let config = Config::new(1).with_stall(Duration::from_millis(300), reaction);
-    bench.handles.push(bench.joints.attach(config).unwrap());
-    bench.run(10);
-    bench.joints.arm(at_ms(bench.ms)).unwrap();
-    bench
+    Bench::of(Joints::new(), [config]).armed_after(10)
 }
 
 #[test]
@@ -336,13 +332,10 @@ fn a_joint_is_there_within_a_64th_of_a_turn_and_stands_within_a_256th() {
 #[test]
 fn a_joint_that_speeds_up_too_slowly_for_a_visible_motion_is_not_checked() {
     for (acceleration, is_checked) in [(20_000, false), (25_000, true)] {
-        let mut bench = Bench::new(&[]);
         let config = Config::new(1)
             .with_stall(Duration::from_millis(300), Reaction::Report)
             .with_acceleration(acceleration);
-        bench.handles.push(bench.joints.attach(config).unwrap());
-        bench.run(10);
-        bench.joints.arm(at_ms(bench.ms)).unwrap();
+        let mut bench = Bench::of(Joints::new(), [config]).armed_after(10);
         let seen = run_to(&mut bench, 30_000, 900, true);
         assert_eq!(seen.len(), usize::from(is_checked), "{acceleration}");
     }

@@ -44,8 +44,11 @@ struct Bench {
 
 impl Bench {
     fn new(ids: &[u8]) -> Self {
-        let mut joints = Joints::new();
-        let handles = ids.iter().map(|id| joints.attach(Config::new(*id)).unwrap()).collect();
+        Self::of(Joints::new(), ids.iter().map(|id| Config::new(*id)))
+    }
+
+    fn of(mut joints: Joints, configs: impl IntoIterator<Item = Config>) -> Self {
+        let handles = configs.into_iter().map(|config| joints.attach(config).unwrap()).collect();
         Self { joints, handles, raw: [0; 12], enabled: [0; 12], silent: Vec::new(), ms: 0 }
     }
 
@@ -114,10 +117,20 @@ impl Bench {
     }
 
     fn armed(ids: &[u8]) -> Self {
-        let mut bench = Self::new(ids);
-        bench.run(30);
-        bench.joints.arm(at_ms(bench.ms)).unwrap();
-        bench
+        Self::new(ids).armed_after(30)
+    }
+
+    fn armed_after(mut self, ms: u64) -> Self {
+        self.run(ms);
+        self.joints.arm(at_ms(self.ms)).unwrap();
+        self
+    }
+
+    /// Milliseconds in which a joint does not answer.
+    fn run_silent(&mut self, id: u8, ms: u64) {
+        self.silent = std::vec![id];
+        self.run(ms);
+        self.silent.clear();
     }
 
     fn state(&self, joint: usize) -> State {

@@ -1,4 +1,4 @@
-//! Who is asked and written to, and when.
+//! The order of requests and writes.
 
 use super::*;
 
@@ -125,8 +125,7 @@ fn a_driver_that_takes_one_frame_a_tick_starves_no_joint() {
     assert!(asked.iter().all(|count| *count > 20), "{asked:?}");
 }
 
-/// What a driver with room for `room` frames takes of an update, and its answers; it gives back the first that it has no
-/// room for, or all of them.
+/// Hands an update to a driver with room for so many frames, and has them answered. The first frame without room comes back, or all of them.
 fn take_some(bench: &mut Bench, room: usize, all_come_back: bool) -> Vec<(u8, Command)> {
     let mut taken = Vec::new();
     let mut refused = Vec::new();
@@ -159,15 +158,12 @@ fn a_driver_with_less_room_than_an_update_has_frames_starves_no_joint() {
     for ((reads, writes), (room, all_come_back)) in
         budgets.flat_map(|budget| drivers().map(move |driver| (budget, driver)))
     {
-        let mut joints = Joints::new().with_timeouts(patient).with_frames_per_update(reads, writes);
-        let handles = ALL.map(|id| joints.attach(Config::new(id)).unwrap());
-        let mut bench = Bench { joints, handles: handles.to_vec(), ..Bench::new(&[]) };
-        bench.run(60);
-        bench.joints.arm(at_ms(bench.ms)).unwrap();
+        let joints = Joints::new().with_timeouts(patient).with_frames_per_update(reads, writes);
+        let mut bench = Bench::of(joints, ALL.map(Config::new)).armed_after(60);
         let (mut asked, mut written) = ([0; 12], [0; 12]);
         for _ in 0..1_200 {
             bench.ms += 1;
-            for joint in handles {
+            for joint in bench.handles.clone() {
                 _ = bench.joints.set_pulses(joint, 1_000);
             }
             bench.joints.update(Tick::new(at_ms(bench.ms), 0.001));
@@ -262,10 +258,7 @@ fn an_update_has_at_least_one_frame_of_a_kind_and_at_most_twelve() {
     for (wanted, each) in [(0, 1), (1, 1), (11, 11), (12, 12), (13, 12), (255, 12)] {
         let joints = Joints::new().with_frames_per_update(wanted, wanted);
         assert_eq!(joints.load().frames_per_s(), 3_000 * each);
-        let mut bench = Bench { joints, ..Bench::new(&[]) };
-        bench.handles = ALL.map(|id| bench.joints.attach(Config::new(id)).unwrap()).to_vec();
-        bench.run(200);
-        bench.joints.arm(at_ms(bench.ms)).unwrap();
+        let mut bench = Bench::of(joints, ALL.map(Config::new)).armed_after(200);
         bench.drive(10);
         assert_eq!(bench.drive(10).len(), 2 * each as usize * 10, "{wanted}");
     }
@@ -281,10 +274,7 @@ fn all_of_an_update(bench: &mut Bench) -> Vec<CanFrame> {
 /// Joints 3 and 5, both written to and asked in each update.
 fn two_at_once() -> Bench {
     let joints = Joints::new().with_frames_per_update(2, 2);
-    let mut bench = Bench { joints, ..Bench::new(&[]) };
-    bench.handles = [3, 5].map(|id| bench.joints.attach(Config::new(id)).unwrap()).to_vec();
-    bench.run(30);
-    bench.joints.arm(at_ms(bench.ms)).unwrap();
+    let mut bench = Bench::of(joints, [3, 5].map(Config::new)).armed_after(30);
     bench.drive(20);
     bench
 }
@@ -342,11 +332,7 @@ fn a_detached_joint_is_disabled_once_and_not_asked_whatever_waits_or_comes_back(
 fn a_target_that_does_not_change_is_repeated_beside_one_that_changes_in_each_update() {
     for (writes, room) in [(1, usize::MAX), (2, 1)] {
         let joints = Joints::new().with_frames_per_update(1, writes);
-        let mut bench = Bench { joints, ..Bench::new(&[]) };
-        bench.handles =
-            [1, 2, 3, 4].map(|id| bench.joints.attach(Config::new(id)).unwrap()).to_vec();
-        bench.run(30);
-        bench.joints.arm(at_ms(bench.ms)).unwrap();
+        let mut bench = Bench::of(joints, [1, 2, 3, 4].map(Config::new)).armed_after(30);
         bench.drive(60);
         let mut written = [0; 4];
         for tick in 0..400 {

@@ -35,9 +35,14 @@ fn what_is_no_reply_is_refused_counted_and_keeps_nothing_fresh() {
     assert_eq!(bench.state(0).bad_replies, 5);
 }
 
-/// Armed, homed at `pulses` from where its drive counts, and driven there for 30 ms.
+/// Armed, homed a turn from where its drive counts, and led there for 30 ms.
 fn homed() -> Bench {
-    let mut bench = Bench::armed(&[1]);
+    homed_with(Timeouts::POLLED)
+}
+
+fn homed_with(timeouts: Timeouts) -> Bench {
+    let joints = Joints::new().with_timeouts(timeouts);
+    let mut bench = Bench::of(joints, [Config::new(1)]).armed_after(30);
     bench.joints.set_offset(bench.handles[0], -65_536).unwrap();
     bench.joints.set_speed(bench.handles[0], AngularVelocity::from_rpm(200.0)).unwrap();
     for _ in 0..30 {
@@ -48,15 +53,19 @@ fn homed() -> Bench {
     bench
 }
 
+/// Late and offline after so many ms.
+fn timeouts(late: u64, offline: u64) -> Timeouts {
+    let [late, offline] = [late, offline].map(Duration::from_millis);
+    Timeouts::POLLED.with_feedback(late, offline).unwrap()
+}
+
 /// Reports another position after a time in which nothing was heard, and not even an update was made if `is_stalled`. Returns whether the
 /// zero counts as lost, and whether the joint is enabled again by targets.
 fn turns_unheard(bench: &mut Bench, silent_ms: u64, is_stalled: bool, raw: i32) -> (bool, bool) {
     if is_stalled {
         bench.ms += silent_ms;
     } else {
-        bench.silent = std::vec![1];
-        bench.run(silent_ms);
-        bench.silent.clear();
+        bench.run_silent(1, silent_ms);
     }
     bench.raw[0] = raw;
     bench.hear(Register::ActualPosition, raw);
@@ -70,6 +79,10 @@ fn a_zero_is_lost_in_a_silence_of_which_a_stalled_loop_knows_nothing() {
     assert_eq!(turns_unheard(&mut homed(), 900, true, 61_000), (true, false));
     assert_eq!(turns_unheard(&mut homed(), 101, true, 0), (true, false), "as an offline joint");
     assert!(!turns_unheard(&mut homed(), 99, true, 0).0);
+    for (silent_ms, is_lost) in [(49, false), (51, true)] {
+        let timeouts = timeouts(20, 50);
+        assert_eq!(turns_unheard(&mut homed_with(timeouts), silent_ms, true, 0).0, is_lost);
+    }
 }
 
 #[test]
@@ -188,25 +201,25 @@ fn a_rate_does_not_outlast_a_set_back_of_the_clock() {
 fn a_joint_that_is_not_enabled_yet_is_not_led() {
     let mut bench = homed();
     bench.run(500);
-    bench.silent = std::vec![1];
-    bench.run(35);
-    bench.silent.clear();
+    bench.run_silent(1, 35);
     bench.raw[0] += 12_500; // 1.2 rad
     let sent = bench.drive(100);
     assert_eq!(bench.state(0).homing, Homing::Uncertain);
     assert!(!sent.contains(&(1, Command::Write(Register::Enable, 1))));
+
+    let mut bench = homed();
+    bench.run(500);
+    let sent = bench.drive(3);
+    assert!(bench.state(0).is_driven && !sent.contains(&(1, Command::Write(Register::Enable, 1))));
+    assert_eq!(turns_unheard(&mut bench, 1, true, 9_000), (true, false)); // 0.86 rad
 }
 
 /// Led between two positions, with neither of them.
 #[test]
 fn a_joint_that_was_led_for_a_moment_may_have_gone_on_its_way() {
-    let patient = Timeouts::POLLED
-        .with_feedback(Duration::from_millis(200), Duration::from_millis(600))
-        .unwrap();
-    let joints = Joints::new().with_timeouts(patient).with_frames_per_update(1, 12);
-    let mut bench = Bench { joints, ..Bench::new(&[]) };
-    let fast = |id: &u8| Config::new(*id).with_speed(AngularVelocity::from_rpm(200.0));
-    bench.handles = ALL.iter().map(|id| bench.joints.attach(fast(id)).unwrap()).collect();
+    let joints = Joints::new().with_timeouts(timeouts(200, 600)).with_frames_per_update(1, 12);
+    let fast = |id| Config::new(id).with_speed(AngularVelocity::from_rpm(200.0));
+    let mut bench = Bench::of(joints, ALL.map(fast));
     // 200 rpm are 1092 pulses in 5 ms.
     let step = |bench: &mut Bench| {
         bench.ms += 5;
@@ -230,18 +243,8 @@ fn a_joint_that_was_led_for_a_moment_may_have_gone_on_its_way() {
 #[test]
 fn a_silence_within_the_configured_time_costs_no_zero() {
     for (silent_ms, is_kept) in [(150, true), (790, true), (900, false)] {
-        let patient = Timeouts::POLLED
-            .with_feedback(Duration::from_millis(40), Duration::from_millis(800))
-            .unwrap();
-        let mut bench = Bench { joints: Joints::new().with_timeouts(patient), ..Bench::new(&[]) };
-        bench.handles = std::vec![bench.joints.attach(Config::new(1)).unwrap()];
-        bench.run(30);
-        bench.joints.arm(at_ms(bench.ms)).unwrap();
-        bench.joints.set_offset(bench.handles[0], -65_536).unwrap();
-        bench.run(30);
-        bench.silent = std::vec![1];
-        bench.run(silent_ms);
-        bench.silent.clear();
+        let mut bench = homed_with(timeouts(40, 800));
+        bench.run_silent(1, silent_ms);
         bench.run(50);
         let is_armed = bench.joints.is_joint_armed(bench.handles[0]);
         let is_homed = bench.state(0).homing == Homing::Homed;

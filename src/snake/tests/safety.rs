@@ -1,4 +1,4 @@
-//! What has to make a joint safe.
+//! Events after which a joint must be disabled.
 
 use super::*;
 
@@ -84,7 +84,7 @@ fn a_position_further_off_than_a_joint_can_go_disarms_it() {
     bench.joints.arm(at_ms(bench.ms)).unwrap();
 }
 
-/// What ends a joint's being driven between two updates, and its name.
+/// The name of an event between two updates after which a joint is no longer driven, and the event.
 type End = (&'static str, fn(&mut Bench));
 
 const ENDS: [End; 7] = [
@@ -230,9 +230,8 @@ fn an_emergency_stop_tells_also_those_that_were_told_before_and_once() {
 /// A question that is handed out without a step would have to be waited for, nobody knows how long.
 #[test]
 fn an_update_without_a_step_asks_nobody() {
-    let mut joints = Joints::new().with_frames_per_update(12, 1);
-    let handles = ALL.map(|id| joints.attach(Config::new(id)).unwrap());
-    let mut bench = Bench { joints, handles: handles.to_vec(), ..Bench::new(&[]) };
+    let joints = Joints::new().with_frames_per_update(12, 1);
+    let mut bench = Bench::of(joints, ALL.map(Config::new));
     bench.run(3);
     bench.joints.update(Tick::new(at_ms(4), 0.001));
     assert!(bench.joints.next_frame().is_some(), "one of twelve questions");
@@ -245,10 +244,7 @@ fn an_update_without_a_step_asks_nobody() {
 fn an_update_without_a_step_that_is_late_moves_no_joint() {
     for (gap_ms, moves) in [(40, true), (41, false), (10_000, false)] {
         let joints = Joints::new().with_frames_per_update(1, 12);
-        let mut bench = Bench { joints, ..Bench::new(&[]) };
-        bench.handles = ALL.map(|id| bench.joints.attach(Config::new(id)).unwrap()).to_vec();
-        bench.run(30);
-        bench.joints.arm(at_ms(bench.ms)).unwrap();
+        let mut bench = Bench::of(joints, ALL.map(Config::new)).armed_after(30);
         bench.drive(6);
         // What the next update has for them stays where it is.
         bench.ms += 1;
@@ -260,7 +256,7 @@ fn an_update_without_a_step_that_is_late_moves_no_joint() {
     }
 }
 
-/// A clock that ran ahead, and was set back: what it said then must not keep a joint from being told again.
+/// The clock ran ahead and was set back: a disable stamped ahead must not put off the next one.
 #[test]
 fn a_relaxed_joint_is_told_again_after_the_clock_was_set_back() {
     for dt_s in [0.001, f32::NAN] {
