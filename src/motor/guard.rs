@@ -118,7 +118,7 @@ impl Guard {
 
     /// Tells whether a motor without feedback for so long is offline, though no update noticed that.
     pub(crate) const fn is_offline_by(&self, gap_us: u32) -> bool {
-        gap_us > SILENCE_US && gap_us > self.device.timeouts().offline_us()
+        gap_us > self.device.timeouts().offline_us()
     }
 
     /// Changes the motor, and notes the consequences.

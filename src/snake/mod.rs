@@ -34,8 +34,9 @@
 //!
 //! A relaxed joint is always disabled before the next bring-up, for any cause and after any time, even if armed before the next update. The
 //! order of writes is mode, current, acceleration, deceleration, speed, target, enable, so no joint is enabled with an earlier target. Then
-//! the target is repeated in its turn, which bounds the effect of a lost frame: as long as new targets leave room, and after 100 ms, with the next check of
-//! ages, as a new target. The enable is never repeated: a drive that lost its supply stays disabled, is detected ([`State::resets`]), and waits to be armed.
+//! the target is repeated, which bounds the effect of a lost frame: in its turn as long as new targets leave room, and with the first check of
+//! ages after 100 ms as a new target. The enable is never repeated: a drive that lost its supply stays disabled, is detected
+//! ([`State::resets`]), and waits to be armed.
 //!
 //! # Conditions
 //! Every change is an [`Edge`](crate::time::Edge) with its time, latched until [`Joints::next_edge`] reads it. [`Joints::health`] is the

@@ -70,8 +70,9 @@ pub(super) struct Slot {
     pending: u8,
     ahead: u8,
     driven: bool,
-    /// The same at the last position.
-    was_driven: bool,
+    /// The drive was enabled at the last position, or since.
+    was_led: bool,
+    /// Time of the last disable or write of the target.
     told_at: Instant,
     turn: u8,
     pub(super) question: Option<Register>,
@@ -114,7 +115,7 @@ impl Slot {
         pending: 0,
         ahead: 0,
         driven: false,
-        was_driven: false,
+        was_led: false,
         told_at: Instant::START,
         turn: 0,
         question: None,
@@ -315,7 +316,7 @@ impl Slot {
         if register == Register::Position {
             self.told_at = now;
         }
-        self.was_driven |= bit == LAST;
+        self.was_led |= bit == LAST;
         Command::Write(register, self.value(register))
     }
 

@@ -39,18 +39,19 @@ impl Slot {
 
     fn receive_position(&mut self, raw: i32, now: Instant) {
         let gap_us = now.since(self.heard).micros_u32().unwrap_or(u32::MAX);
-        if let (Some(before), Link::Online | Link::Late) = (self.raw, self.guard.link()) {
-            if self.guard.is_offline_by(gap_us) {
-                self.lose_zero(now);
-                self.guard.relax_until_armed();
-            } else if way(before, raw) > furthest(self, before, gap_us as f32 * 1e-6) {
-                self.position_jumps = self.position_jumps.saturating_add(1);
-                self.distrust(now);
-            }
+        let was_heard = matches!(self.guard.link(), Link::Online | Link::Late);
+        let is_further = |before| way(before, raw) > furthest(self, before, gap_us as f32 * 1e-6);
+        if was_heard && self.raw.is_some_and(is_further) {
+            self.position_jumps = self.position_jumps.saturating_add(1);
+            self.distrust(now);
         }
-        self.was_driven = is_up(self);
+        self.was_led = is_up(self);
         measure_rate(self, raw, now);
         if !self.guard.hear_in_time(now) {
+            if was_heard && self.guard.is_offline_by(gap_us) {
+                self.lose_zero(now);
+                self.guard.relax_until_armed();
+            }
             match self.raw {
                 Some(_) => self.traffic.gap(gap_us),
                 None => self.window_from = now,
@@ -129,11 +130,10 @@ fn way(one: i32, other: i32) -> f32 {
     other.wrapping_sub(one).unsigned_abs() as f32 * (TAU / PULSES_PER_TURN as f32)
 }
 
-/// Returns the largest way of a joint from a position, so many s after the position was heard: to its target, if led since.
+/// Returns the largest way in rad of a joint from a position, so many s after the position was heard: to its target, if led since.
 fn furthest(slot: &Slot, before: i32, gap_s: f32) -> f32 {
-    let is_led = is_up(slot) || slot.was_driven;
-    let asked = if is_led { (way(before, slot.target), way(0, slot.speed)) } else { (0.0, 0.0) };
-    JUMP + motor::furthest(gap_s, slot.rate, asked)
+    let target = if slot.was_led { slot.target } else { before };
+    JUMP + motor::furthest(gap_s, slot.rate, (way(before, target), way(0, slot.speed)))
 }
 
 fn measure_rate(slot: &mut Slot, raw: i32, now: Instant) {
