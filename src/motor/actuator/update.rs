@@ -94,7 +94,7 @@ impl<M: DriveProtocol> Actuator<M> {
         outcome
     }
 
-    /// Notes a command of another controller. What others send on a shared id may be for another drive.
+    /// Notes a command of another controller. A command with a shared id may be for another drive.
     #[inline(never)]
     fn hear_command(&mut self, frame: &CanFrame, now: Instant) {
         let is_its =
