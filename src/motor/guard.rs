@@ -112,13 +112,8 @@ impl Guard {
     }
 
     /// Tells whether a drive may have started again without feedback for so long. Feedback that is late only after more is polled seldom.
-    pub(super) const fn is_silence(&self, gap_us: u32) -> bool {
+    pub(crate) const fn is_silence(&self, gap_us: u32) -> bool {
         gap_us > SILENCE_US && gap_us > self.device.timeouts().late_us()
-    }
-
-    /// Tells whether a motor without feedback for so long is offline, though no update noticed that.
-    pub(crate) const fn is_offline_by(&self, gap_us: u32) -> bool {
-        gap_us > self.device.timeouts().offline_us()
     }
 
     /// Changes the motor, and notes the consequences.

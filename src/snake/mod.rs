@@ -33,10 +33,11 @@
 //! * again each 100 ms while a joint is relaxed: a drive may have missed the frame.
 //!
 //! A relaxed joint is always disabled before the next bring-up, for any cause and after any time, even if armed before the next update. The
-//! order of writes is mode, current, acceleration, deceleration, speed, target, enable, so no joint is enabled with an earlier target. Then
-//! the target is repeated, which bounds the effect of a lost frame: in its turn as long as new targets leave room, and with the first check of
-//! ages after 100 ms as a new target. The enable is never repeated: a drive that lost its supply stays disabled, is detected
-//! ([`State::resets`]), and waits to be armed.
+//! order of writes is mode, current, acceleration, deceleration, speed, target, enable: a joint is enabled with a target at most one turn of
+//! writes old (12 ms of 12 joints at 1 kHz). Then the target is repeated, which bounds the effect of a lost frame: in its turn as long as new
+//! targets leave room, and with the first check of ages after 100 ms as a new target. The enable is never repeated. A drive that lost its supply for less than *late* stays disabled, is
+//! detected ([`State::resets`]), and waits to be armed. After a longer loss, the joint was late and is brought up from the beginning, with its
+//! zero up to 100 ms, and to be armed after that.
 //!
 //! # Conditions
 //! Every change is an [`Edge`](crate::time::Edge) with its time, latched until [`Joints::next_edge`] reads it. [`Joints::health`] is the
@@ -45,7 +46,7 @@
 //! | condition | holds while | the joint |
 //! |---|---|---|
 //! | late, offline | there is no fresh position; the joint is lost, until ten positions in a row | is disabled; waits to be armed after *offline* |
-//! | ESC fault | the joint was found disabled, or further off than possible, until armed | is disabled, waits to be armed |
+//! | ESC fault | the joint was found disabled before *late*, or further off than possible, until armed | is disabled, waits to be armed |
 //! | position uncertain | the drive may have lost its zero, until the zero is set | goes on |
 //! | stalled | the joint is away from its target and does not move: blocked in either direction | as configured; goes on |
 //! | command lost | the application let the target expire | is disabled, until the next target |

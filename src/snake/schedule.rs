@@ -89,7 +89,7 @@ pub(super) fn plan(joints: &mut Joints) {
             }
             let Some(slot) = joints.slots.get(usize::from(index)) else { continue };
             let free = is_free(joints, index) && joints.writes & 1 << index == 0;
-            let wants = if news { slot.has_news() } else { slot.is_driven() };
+            let wants = if news { slot.has_news() } else { slot.driven };
             if free && wants {
                 joints.writes |= 1 << index;
                 joints.last_write = index;

@@ -69,7 +69,7 @@ pub(super) struct Slot {
     /// Registers of [`Register::SEQUENCE`] that wait for a write; and registers with precedence, all of them before the first write.
     pending: u8,
     ahead: u8,
-    driven: bool,
+    pub(super) driven: bool,
     /// The drive was enabled at the last position, or since.
     was_led: bool,
     /// Time of the last disable or write of the target.
@@ -204,10 +204,6 @@ impl Slot {
         now.since(self.told_at) >= REMIND || now < self.told_at
     }
 
-    pub(super) const fn is_driven(&self) -> bool {
-        self.driven
-    }
-
     /// Relaxes a driven joint that may no longer be driven. Returns whether the joint must be disabled: not if there was no write since the
     /// last disable.
     pub(super) const fn let_go(&mut self) -> bool {
@@ -333,9 +329,11 @@ impl Slot {
     }
 
     /// Takes back a write that was not sent: its turn comes again, and then the turns of the registers behind it. Registers before it in
-    /// the sequence keep their places.
+    /// the sequence keep their places, but a new target goes before the enable.
     pub(super) fn take_back(&mut self, register: Register) {
-        self.ahead |= self.renew(register).wrapping_neg();
+        let bit = self.renew(register);
+        let first = if bit == LAST { LAST >> 1 } else { bit };
+        self.ahead |= first.wrapping_neg();
     }
 
     /// Marks a register for a write; returns its bit.
@@ -343,6 +341,8 @@ impl Slot {
         let place = Register::SEQUENCE.iter().position(|other| *other == register);
         let bit = place.map_or(0, |place| 1 << place);
         self.pending |= bit;
+        // An enable that comes back was not sent.
+        self.was_led &= bit != LAST;
         bit
     }
 }

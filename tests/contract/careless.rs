@@ -414,10 +414,12 @@ enum Haste {
     HasNoLimit,
     /// Its command is an offset binary number, and its rest zero bytes.
     RestsAtTheEnd,
+    /// Rests for 50 ms more after each rest.
+    SleepsOn,
 }
 
-/// A motor whose command is its torque in percent of the largest, 2 Nm.
-struct Hasty(Haste);
+/// A motor whose command is its torque in percent of the largest, 2 Nm; and the commands for which it sleeps on.
+struct Hasty(Haste, u8);
 
 impl DriveProtocol for Hasty {
     fn name(&self) -> MotorName {
@@ -437,8 +439,12 @@ impl DriveProtocol for Hasty {
     }
     fn control(&mut self, Order { target, share, .. }: Order) -> CanFrame {
         let Target::Torque(torque_nm) = target else { return self.rest() };
+        if self.1 > 0 {
+            self.1 -= 1;
+            return self.rest();
+        }
         let limit = match self.0 {
-            Haste::None | Haste::RestsAtTheEnd => share,
+            Haste::None | Haste::RestsAtTheEnd | Haste::SleepsOn => share,
             Haste::IgnoresTheShare => 1.0,
             Haste::BeginsAbove => (0.3 + 0.7 * share).min(1.0),
             Haste::OpensTooEarly => (3.0 * share).min(1.0),
@@ -450,7 +456,9 @@ impl DriveProtocol for Hasty {
         let offset = if self.0 == Haste::RestsAtTheEnd { 100 } else { 0 };
         CanFrame::new(id(0x123), &[percent.cast_unsigned().wrapping_add(offset)]).unwrap()
     }
-    fn reset(&mut self) {}
+    fn reset(&mut self) {
+        self.1 = if self.0 == Haste::SleepsOn { 50 } else { 0 };
+    }
     fn capabilities(&self) -> Capabilities {
         Capabilities::of(&[Capability::Torque, Capability::Feedback])
     }
@@ -491,8 +499,9 @@ fn the_check_finds_a_loop_that_drives_at_once_or_without_a_limit() {
         (Haste::OpensTooEarly, true, Err(Rule::OpensFromZero)),
         (Haste::HasNoLimit, true, Err(Rule::OpensFromZero)),
         (Haste::RestsAtTheEnd, true, Err(Rule::DisarmedIsZero)),
+        (Haste::SleepsOn, true, Err(Rule::OldTargetsAreZero)),
     ] {
-        let checked = check_contract(|| HastySubject(Actuator::new(Hasty(haste)), knows_effort));
+        let checked = check_contract(|| HastySubject(Actuator::new(Hasty(haste, 0)), knows_effort));
         assert_eq!(checked.map_err(|violation| violation.rule), found, "{haste:?}");
     }
 }

@@ -39,6 +39,7 @@ const AGES: Seeds<'static> = Seeds {
         "dt_s",
         "elapsed",
         "first_time",
+        "furthest",
         "gap_us",
         "heard",
         "held_steps",
@@ -59,7 +60,7 @@ const AGES: Seeds<'static> = Seeds {
 };
 
 /// Ages that a family compares with a limit: of the frames of its drives, none of a link or a target. File, words, reason.
-const TIMES_OF_DRIVES: [(&str, &str, &str); 24] = [
+const TIMES_OF_DRIVES: [(&str, &str, &str); 26] = [
     ("dji/outbox.rs", "self . keep_alive_us", "zero frames are sent again"),
     (
         "dji/slot/gap.rs",
@@ -92,9 +93,11 @@ const TIMES_OF_DRIVES: [(&str, &str, &str); 24] = [
     ("snake/schedule.rs", "passed > timeout", "a reply that does not come is not waited for"),
     ("snake/slot.rs", "REMIND", "a disable or a target is sent again: a drive may have missed it"),
     ("snake/slot.rs", "now < self . told_at", "the same after a set-back of the clock"),
+    ("snake/slot/health.rs", "furthest", "a position further away than a joint can have moved"),
     ("snake/slot/health.rs", "RATE_SPAN", "the span of a rate"),
     ("snake/slot/health.rs", "now < since", "the same after a set-back of the clock"),
     ("snake/slot/health.rs", "window", "a joint that does not move, as its configuration says"),
+    ("motor/actuator/joint.rs", "furthest", "an angle further away than a shaft can have turned"),
     (
         "motor/actuator/joint.rs",
         "gap_s > known_s",

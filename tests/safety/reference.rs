@@ -140,7 +140,10 @@ impl Reference {
         let Some(late_us) = self.rules.late_us else { return };
         self.edges.begin_call();
         let is_silence = now.saturating_sub(self.heard) > OFFLINE_US.max(late_us);
-        if self.rules.loses_zero && is_silence && matches!(self.link, Link::Online | Link::Late) {
+        if self.rules.loses_zero
+            && is_silence
+            && !matches!(self.link, Link::Unheard | Link::Offline)
+        {
             self.edges.set(Condition::PositionUncertain, true, now);
             self.fall_to(Arming::Tripped);
         }

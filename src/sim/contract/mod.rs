@@ -58,8 +58,8 @@ pub trait Subject {
     }
 
     /// Returns the effort that a command asks of its motor, as a share of the largest, -1 to 1; `None`, the default, for a command
-    /// whose effort only the drive knows, for a question, for a brake at rest. Read the frame as the manual of the drive does: with `None`, no
-    /// check finds a torque at rest.
+    /// whose effort only the drive knows, for a question, for a brake at rest. Read the frame as the manual of the drive does: with `None`, a
+    /// torque at rest is found by [`is_zero`](Self::is_zero) alone. Feedback stands still here, so a rest that brakes a turning shaft passes.
     fn effort(&self, command: &CanFrame) -> Option<f32> {
         let _ = command;
         None

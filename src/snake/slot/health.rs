@@ -39,7 +39,7 @@ impl Slot {
 
     fn receive_position(&mut self, raw: i32, now: Instant) {
         let gap_us = now.since(self.heard).micros_u32().unwrap_or(u32::MAX);
-        let was_heard = matches!(self.guard.link(), Link::Online | Link::Late);
+        let was_heard = !matches!(self.guard.link(), Link::Unheard | Link::Offline);
         let is_further = |before| way(before, raw) > furthest(self, before, gap_us as f32 * 1e-6);
         if was_heard && self.raw.is_some_and(is_further) {
             self.position_jumps = self.position_jumps.saturating_add(1);
@@ -48,7 +48,7 @@ impl Slot {
         self.was_led = is_up(self);
         measure_rate(self, raw, now);
         if !self.guard.hear_in_time(now) {
-            if was_heard && self.guard.is_offline_by(gap_us) {
+            if was_heard && self.guard.is_silence(gap_us) {
                 self.lose_zero(now);
                 self.guard.relax_until_armed();
             }
