@@ -368,8 +368,8 @@ impl Standstill {
     /// Returns whether the clock stands; true once for each full count.
     pub(super) const fn take(&mut self) -> bool {
         let a_frame = if self.limit < FRAMES { 1 } else { self.limit / FRAMES };
-        let passed = self.readings.saturating_add(self.frames.saturating_mul(a_frame));
-        let stands = passed >= self.limit;
+        let stands =
+            self.readings >= self.limit || self.frames.saturating_mul(a_frame) >= self.limit;
         if stands {
             (self.readings, self.frames) = (0, 0);
         }
@@ -621,6 +621,11 @@ mod standstill_tests {
         assert!((490..=500).contains(&ms(noticed_us(1_000, 250))));
         // The clock may be read faster at any time.
         assert!((1_990..=2_000).contains(&ms(noticed_us(1_000, 1_000))));
+    }
+
+    #[test]
+    fn frames_do_not_count_beside_readings_of_the_same_time() {
+        assert_eq!(stood(10_000, &[(315_040, 12_086), (501, 19_142)]), 0);
     }
 
     #[test]
