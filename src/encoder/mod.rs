@@ -122,27 +122,31 @@ fn fits_an_earlier_frame(counts: i32, slack: f32) -> bool {
 
 /// The distance of a shaft from the turns that a drive can report, in ranges of the feedback.
 #[derive(Debug, Default, Clone, Copy)]
-pub(crate) struct Laps(i32);
+pub(crate) struct Laps {
+    laps: i32,
+    /// The last reported position, in counts; `None` before the first.
+    last: Option<u16>,
+}
 
 impl Laps {
     /// Takes an unbounded position, and the range.
     #[expect(clippy::cast_possible_truncation, reason = "saturates")]
-    pub(crate) fn of(position: f32, range: f32) -> Self {
-        if position.abs() <= range {
-            return Self(0);
-        }
+    pub(crate) fn set(&mut self, position: f32, range: f32) {
         let laps = ((position.abs() + range) / (2.0 * range)) as i32;
-        Self(if position > 0.0 { laps } else { -laps })
+        let signed = if position > 0.0 { laps } else { -laps };
+        self.laps = if position.abs() <= range { 0 } else { signed };
     }
 
-    /// Takes a reported position and the position before: a way of more than the range leads across its end.
-    pub(crate) fn advance(&mut self, before: Option<f32>, position: f32, range: f32) {
-        let way = before.map_or(0.0, |before| position - before);
-        self.0 = self.0.saturating_add(i32::from(way < -range) - i32::from(way > range));
+    /// Takes a reported position, in counts of 65535 a range: a way of more than half the range leads across its end.
+    pub(crate) fn advance(&mut self, position: u16) {
+        let way = i32::from(position) - i32::from(self.last.unwrap_or(position));
+        let most = i32::from(u16::MAX / 2);
+        self.laps = self.laps.saturating_add(i32::from(way < -most) - i32::from(way > most));
+        self.last = Some(position);
     }
 
     pub(crate) const fn is_none(self) -> bool {
-        self.0 == 0
+        self.laps == 0
     }
 }
 
@@ -206,25 +210,25 @@ mod tests {
             (-4.5, -1),
             (-12.5, -2),
         ] {
-            assert_eq!(Laps::of(position, 4.0).0, laps, "{position}");
+            let mut found = Laps::default();
+            found.set(position, 4.0);
+            assert_eq!((found.laps, found.is_none()), (laps, laps == 0), "{position}");
         }
         let mut laps = Laps::default();
-        for (before, position, expected) in [
-            (None, 3.9, 0),
-            (Some(3.9), -3.9, 1),
-            (Some(-3.9), 0.0, 1),
-            (Some(0.0), 4.0, 1),
-            (Some(4.0), 0.0, 1),
-            (Some(0.0), -3.9, 1),
-            (Some(-3.9), 3.9, 0),
-            (Some(-3.9), 3.9, -1),
+        for (position, expected) in [
+            (0xFF00, 0),
+            (0x0100, 1),
+            (0x80FF, 1),
+            (0x0100, 1),
+            (0x8100, 0),
+            (0x0100, 1),
+            (0xFF00, 0),
+            (0x8000, 0),
+            (0x0100, 0),
+            (0xFF00, -1),
         ] {
-            laps.advance(before, position, 4.0);
-            assert_eq!(
-                (laps.0, laps.is_none()),
-                (expected, expected == 0),
-                "{before:?}, {position}"
-            );
+            laps.advance(position);
+            assert_eq!((laps.laps, laps.is_none()), (expected, expected == 0), "{position:#06X}");
         }
     }
 

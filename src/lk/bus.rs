@@ -9,7 +9,7 @@ use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::{
     Capabilities, Capability, Claim, DriveProtocol, Goal, Ingest, MotorName, Order, Questions,
-    Vitals, WrongSetting,
+    Shaft, Vitals, WrongSetting,
 };
 use crate::units::{Angle, AngularVelocity};
 
@@ -181,17 +181,16 @@ impl DriveProtocol for Motor {
         let data = frame.bytes();
         let [code, ..] = *data;
         let is_answer = [0x9C, 0xA1, self.mode.0.number].contains(&code);
-        if !is_answer || is_command(data, self.mode.limit(1.0, &self.model.scale())) {
+        if !is_answer || is_command(data, || self.mode.limit(1.0, &self.model.scale())) {
             return Ingest::Unrelated;
         }
         let Some(feedback) = Feedback::decode(data) else { return Ingest::Unrelated };
         let Some(phase) = feedback.phase(&self.model) else {
             return Ingest::WrongField;
         };
-        match self.drive.and_then(|drive| drive.phase(&self.model)) {
-            Some(before) => self.rotor += i64::from(phase.wrapping_sub(before).cast_signed()),
-            None => self.rotor = phase.into(),
-        }
+        let [low, high, ..] = self.rotor.to_le_bytes();
+        let way = phase.wrapping_sub(u16::from_le_bytes([low, high])).cast_signed();
+        self.rotor = if self.drive.is_some() { self.rotor + i64::from(way) } else { phase.into() };
         self.drive = Some(feedback);
         // An angle alone ends a silence that was long.
         self.silent = if self.silent < SILENT { 0 } else { SILENT };
@@ -199,14 +198,11 @@ impl DriveProtocol for Motor {
     }
 
     fn velocity(&self) -> AngularVelocity {
-        let velocity = self.drive.map_or(0.0, |drive| drive.velocity_rad_per_s(&self.model));
-        AngularVelocity::from_rad_per_s(velocity)
+        shaft(self.drive.as_ref(), self.rotor, &self.model).1
     }
 
-    /// Turns of the output shaft count.
     fn angle(&self) -> Option<Angle> {
-        self.drive?;
-        Some(Angle::from_turns(self.rotor as f32 / 65_536.0 / self.model.gear()))
+        shaft(self.drive.as_ref(), self.rotor, &self.model).0
     }
 
     fn rest(&mut self) -> CanFrame {
@@ -217,8 +213,9 @@ impl DriveProtocol for Motor {
     /// nothing counts from the angle until the angle has been read again.
     fn control(&mut self, order: Order) -> CanFrame {
         let needs_angle = self.mode.0.is_angle();
-        let (shaft, scale) = ((self.angle(), self.velocity()), self.model.scale());
-        let goal = self.mode.0.goal(order, || shaft, scale.max_velocity);
+        let (drive, rotor, model) = (self.drive.as_ref(), self.rotor, &self.model);
+        let scale = model.scale();
+        let goal = self.mode.0.goal(order, || shaft(drive, rotor, model), scale.max_velocity);
         let limit = self.mode.limit(order.share, &scale);
         let command = goal.and_then(|goal| self.command(goal, limit)).unwrap_or(Command::REST);
         self.silent = if needs_angle { self.silent.saturating_add(1) } else { 0 };
@@ -324,6 +321,7 @@ impl DriveProtocol for Motor {
         capabilities.with(Capability::ErrorCodes)
     }
 
+    #[inline]
     fn vitals(&self) -> Vitals {
         let Some(drive) = self.drive else { return Vitals::default() };
         let errors = self.state.map_or(0, |state| state.errors);
@@ -335,6 +333,14 @@ impl DriveProtocol for Motor {
             ..Vitals::of_errors([errors], 0)
         }
     }
+}
+
+/// Returns angle and velocity of the output shaft; its turns count.
+#[inline]
+fn shaft(drive: Option<&Feedback>, rotor: i64, model: &Model) -> Shaft {
+    let Some(drive) = drive else { return (None, AngularVelocity::ZERO) };
+    let angle = Angle::from_turns(rotor as f32 / 65_536.0 / model.gear());
+    (Some(angle), AngularVelocity::from_rad_per_s(drive.velocity_rad_per_s(model)))
 }
 
 /// Truncates, so that a limit holds; NaN is zero.

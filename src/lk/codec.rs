@@ -80,14 +80,20 @@ const fn within(current: i16) -> i16 {
 /// writes to bytes 2 and 3.
 ///
 /// Byte 1 of a command is 0; in an answer a 0 there is a temperature of 0 °C.
-pub(crate) const fn is_command(data: &[u8; 8], limit: u16) -> bool {
-    let [code, first, a, b, c, d, e, f] = *data;
-    first == 0
-        && match code {
-            0xA1 => matches!([a, b, e, f], [0, 0, 0, 0]),
-            0xA2 | 0xA4 => u16::from_le_bytes([a, b]) <= limit,
-            _ => matches!([a, b, c, d, e, f], [0, 0, 0, 0, 0, 0]),
-        }
+#[inline]
+pub(crate) fn is_command(data: &[u8; 8], limit: impl FnOnce() -> u16) -> bool {
+    data[1] == 0 && has_fields_of_command(data, limit)
+}
+
+#[cold]
+#[inline(never)]
+fn has_fields_of_command(data: &[u8; 8], limit: impl FnOnce() -> u16) -> bool {
+    let [code, _, a, b, c, d, e, f] = *data;
+    match code {
+        0xA1 => matches!([a, b, e, f], [0, 0, 0, 0]),
+        0xA2 | 0xA4 => u16::from_le_bytes([a, b]) <= limit(),
+        _ => matches!([a, b, c, d, e, f], [0, 0, 0, 0, 0, 0]),
+    }
 }
 
 /// Returns the id of the frames of a drive.
@@ -168,9 +174,8 @@ impl Feedback {
 
     /// Returns the angle of the rotor in 1/65536 of a turn; `None` if the encoder of the model does not have this value.
     pub(super) const fn phase(&self, model: &Model) -> Option<u16> {
-        let spare = 16 - model.encoder_bits() as u32;
-        let phase = self.encoder << spare;
-        if phase >> spare == self.encoder { Some(phase) } else { None }
+        let bits = model.encoder_bits() as u32;
+        if self.encoder as u32 >> bits == 0 { Some(self.encoder << (16 - bits)) } else { None }
     }
 }
 

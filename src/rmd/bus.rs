@@ -11,7 +11,7 @@ use crate::lk::codec::{id_of, is_command};
 use crate::lk::model::RAD_PER_DEGREE;
 use crate::motor::{
     Capabilities, Capability, Claim, DriveProtocol, Goal, Ingest, MotorName, Order, Questions,
-    Vitals, WrongSetting, lowest_bit,
+    Shaft, Vitals, WrongSetting, lowest_bit,
 };
 use crate::units::{Angle, AngularVelocity};
 
@@ -42,7 +42,8 @@ impl Motor {
             }
             Goal::Velocity(velocity) => Some(Command::Velocity(whole(velocity * counts))),
             Goal::Way(way) => {
-                let angle = self.track?.counts() + i64::from(whole(way * counts));
+                let angle =
+                    self.track?.counts(self.drive?.angle_deg) + i64::from(whole(way * counts));
                 Some(Command::Position(i32::try_from(angle).ok()?, limit))
             }
             Goal::Impedance(_) => None,
@@ -76,7 +77,9 @@ impl Motor {
             self.doubt();
             return;
         }
-        if self.has_angle && self.track.is_some_and(|track| track.is_far_from(angle)) {
+        if self.has_angle
+            && self.track.is_some_and(|track| track.is_far_from(angle, drive.angle_deg))
+        {
             self.doubt();
         } else {
             self.enabling.is_prepared |= self.mode.0.is_angle();
@@ -102,13 +105,10 @@ impl DriveProtocol for Motor {
         }
         let data = frame.bytes();
         let is_answer = [0x9C, 0xA1, self.mode.0.number].contains(&data[0]);
-        if !is_answer || is_command(data, self.mode.limit(1.0, &self.model.scale())) {
+        if !is_answer || is_command(data, || self.mode.limit(1.0, &self.model.scale())) {
             return Ingest::Unrelated;
         }
         let Some(feedback) = Feedback::decode(data) else { return Ingest::Unrelated };
-        if let Some(track) = &mut self.track {
-            track.advance(0.0, feedback.angle_deg);
-        }
         self.drive = Some(feedback);
         self.enabling.is_heard = true;
         // An angle alone ends a silence that was long.
@@ -117,13 +117,11 @@ impl DriveProtocol for Motor {
     }
 
     fn velocity(&self) -> AngularVelocity {
-        let velocity = self.drive.map_or(0.0, |drive| f32::from(drive.velocity_dps));
-        AngularVelocity::from_rad_per_s(velocity * RAD_PER_DEGREE)
+        shaft(self.drive.as_ref(), self.track.as_ref()).1
     }
 
-    /// Turns of the output shaft count, from the zero of the drive.
     fn angle(&self) -> Option<Angle> {
-        Some(Angle::from_turns(self.track?.turns()))
+        shaft(self.drive.as_ref(), self.track.as_ref()).0
     }
 
     fn rest(&mut self) -> CanFrame {
@@ -138,8 +136,8 @@ impl DriveProtocol for Motor {
             let way = 100.0 * f32::from(drive.velocity_dps) * order.step.dt_s();
             track.advance(way, drive.angle_deg);
         }
-        let (shaft, scale) = ((self.angle(), self.velocity()), self.model.scale());
-        let goal = self.mode.0.goal(order, || shaft, scale.max_velocity);
+        let (drive, track, scale) = (self.drive.as_ref(), self.track.as_ref(), self.model.scale());
+        let goal = self.mode.0.goal(order, || shaft(drive, track), scale.max_velocity);
         let limit = self.mode.limit(order.share, &scale);
         self.last = goal.and_then(|goal| self.command(goal, limit)).unwrap_or(Command::REST);
         self.silent = self.silent.saturating_add(self.mode.0.is_angle().into());
@@ -273,6 +271,7 @@ impl DriveProtocol for Motor {
         capabilities.with(Capability::ErrorCodes)
     }
 
+    #[inline]
     fn vitals(&self) -> Vitals {
         let Some(drive) = self.drive else { return Vitals::default() };
         let (errors, supply_v) =
@@ -288,4 +287,13 @@ impl DriveProtocol for Motor {
             ..Vitals::of_errors([lowest_bit(errors.into())], 0)
         }
     }
+}
+
+/// Returns angle and velocity of the output shaft; its turns count from the zero of the drive.
+#[inline]
+fn shaft(drive: Option<&Feedback>, track: Option<&Track>) -> Shaft {
+    let Some(drive) = drive else { return (None, AngularVelocity::ZERO) };
+    let angle = track.map(|track| Angle::from_turns(track.turns(drive.angle_deg)));
+    let velocity = f32::from(drive.velocity_dps) * RAD_PER_DEGREE;
+    (angle, AngularVelocity::from_rad_per_s(velocity))
 }

@@ -163,22 +163,26 @@ impl Track {
         Self { read, degrees, way: 0.0 }
     }
 
-    /// Moves on by a way, within a degree of what feedback says.
+    /// Moves on by a way, within a degree of the feedback in °.
     pub(super) fn advance(&mut self, way: f32, degrees: i16) {
+        self.way = self.way_by(way, degrees);
+    }
+
+    fn way_by(&self, way: f32, degrees: i16) -> f32 {
         let moved = 100.0 * f32::from(degrees.wrapping_sub(self.degrees));
-        self.way = limited(self.way + way, moved - 100.0, moved + 100.0);
+        limited(self.way + way, moved - 100.0, moved + 100.0)
     }
 
     /// Tells whether an angle is more than half a turn away.
-    pub(super) fn is_far_from(&self, angle: i32) -> bool {
-        (i64::from(angle) - self.counts()).abs() > 18_000
+    pub(super) fn is_far_from(&self, angle: i32, degrees: i16) -> bool {
+        (i64::from(angle) - self.counts(degrees)).abs() > 18_000
     }
 
-    pub(super) fn counts(&self) -> i64 {
-        i64::from(self.read) + i64::from(whole(self.way))
+    pub(super) fn counts(&self, degrees: i16) -> i64 {
+        i64::from(self.read) + i64::from(whole(self.way_by(0.0, degrees)))
     }
 
-    pub(super) const fn turns(&self) -> f32 {
-        (self.read as f32 + self.way) / 36_000.0
+    pub(super) fn turns(&self, degrees: i16) -> f32 {
+        (self.read as f32 + self.way_by(0.0, degrees)) / 36_000.0
     }
 }

@@ -1,6 +1,6 @@
 //! The motor as an actuator: its claims, its frames, and their order.
 
-use super::codec::{Command, FAULTS, VALUE, answer, register};
+use super::codec::{Command, FAULTS, VALUE, answer, is_feedback, operation, register};
 use super::config::Mode;
 use super::{Feedback, Model, Register, Status};
 use crate::control::PidConfig;
@@ -51,8 +51,8 @@ pub struct Motor {
     host: u8,
     timeout: TimeoutUnits,
     mode: Mode,
-    /// The last feedback; `None` before the first.
-    drive: Option<Feedback>,
+    /// The last feedback, whose numbers are converted where they are read; `None` before the first.
+    drive: Option<CanFrame>,
     /// The distance of the shaft from the reported turns, in ranges of the feedback.
     laps: Laps,
     /// The faults of the last report.
@@ -121,8 +121,9 @@ impl Motor {
 
     /// Returns the last feedback of the drive; `None` before the first.
     #[must_use]
-    pub const fn feedback(&self) -> Option<&Feedback> {
-        self.drive.as_ref()
+    #[inline]
+    pub fn feedback(&self) -> Option<Feedback> {
+        self.drive.as_ref().map(|frame| Feedback::of(frame, &self.model))
     }
 
     /// Returns the faults of the drive's last report, as the manual counts their bits; 0 once cleared.
@@ -164,6 +165,7 @@ impl Motor {
         Ok(())
     }
 
+    #[inline]
     fn frame_of(&self, command: Command) -> CanFrame {
         command.encode(&self.model, self.host, self.id)
     }
@@ -188,14 +190,9 @@ impl Motor {
         }
     }
 
-    fn has_fault(&self) -> bool {
-        let has_fault = |drive: Feedback| drive.faults != 0 || drive.status == Status::Calibration;
-        self.reported != 0 || self.drive.is_some_and(has_fault)
-    }
-
     /// Disables the drive. If the drive reports a fault, each second frame from then on clears the fault.
     fn off(&mut self) -> CanFrame {
-        self.turn = if self.has_fault() { self.turn.wrapping_add(1) } else { 0 };
+        self.turn = if self.vitals().has_fault { self.turn.wrapping_add(1) } else { 0 };
         let clears = self.turn != 0 && self.turn.is_multiple_of(2);
         self.has_cleared |= clears;
         self.frame_of(if clears { Command::ClearFaults } else { Command::Disable })
@@ -219,25 +216,24 @@ impl DriveProtocol for Motor {
     }
 
     fn decode(&mut self, frame: &CanFrame) -> Ingest {
-        ingest_eight(frame, |_| {
-            let feedback = Feedback::decode(frame, &self.model)?;
-            let before = self.drive.map(|drive| drive.measured.position_rad);
-            self.laps.advance(before, feedback.measured.position_rad, self.model.pmax_rad());
-            if self.has_cleared && feedback.faults == 0 {
+        ingest_eight(frame, |&[a, b, ..]| {
+            is_feedback(frame).then_some(())?;
+            self.laps.advance(u16::from_be_bytes([a, b]));
+            self.drive = Some(*frame);
+            if self.has_cleared && Feedback::of(frame, &self.model).faults == 0 {
                 (self.reported, self.has_cleared) = (0, false);
             }
-            self.drive = Some(feedback);
             Some(())
         })
     }
 
     fn velocity(&self) -> AngularVelocity {
-        self.drive.map_or(AngularVelocity::ZERO, |drive| drive.measured.velocity())
+        self.feedback().map_or(AngularVelocity::ZERO, |drive| drive.measured.velocity())
     }
 
     /// Beyond the range of the feedback the angle is unknown: a RobStride reports the rest of a lap then.
     fn angle(&self) -> Option<Angle> {
-        self.drive.filter(|_| self.laps.is_none())?.angle()
+        self.feedback().filter(|_| self.laps.is_none())?.angle()
     }
 
     fn rest(&mut self) -> CanFrame {
@@ -248,8 +244,11 @@ impl DriveProtocol for Motor {
     fn control(&mut self, order: Order) -> CanFrame {
         let shaft = (self.angle(), self.velocity());
         let command = self.drive.and_then(|_| self.mode.command(order, shaft, &self.model));
-        let Some(command) = command else { return self.rest() };
-        self.frame_of(command)
+        match command {
+            Some(Command::Operation(command)) => operation(&command, &self.model, self.id),
+            Some(command) => self.frame_of(command),
+            None => self.rest(),
+        }
     }
 
     fn reset(&mut self) {
@@ -284,7 +283,7 @@ impl DriveProtocol for Motor {
     }
 
     fn is_enabled(&self) -> Option<bool> {
-        self.drive.map(|drive| drive.status == Status::Run)
+        self.feedback().map(|drive| drive.status == Status::Run)
     }
 
     /// Every fourth time a drive in another run mode gets the configured mode: a drive starts in the operation mode. A drive answers
@@ -313,7 +312,7 @@ impl DriveProtocol for Motor {
                 let Some(register) = register(u16::from_le_bytes([a, b])) else { return true };
                 let value = if is_known { register.form().value_of(value) } else { f32::NAN };
                 if register == Register::MechanicalPosition {
-                    self.laps = Laps::of(value, self.model.pmax_rad());
+                    self.laps.set(value, self.model.pmax_rad());
                 }
                 if let Some(asked) = self.settings.awaited(register) {
                     self.settings.take(asked, value);
@@ -343,9 +342,10 @@ impl DriveProtocol for Motor {
         if self.model.knows_angle() { known.with(Capability::AbsoluteAngle) } else { known }
     }
 
+    #[inline]
     #[expect(clippy::cast_possible_truncation, reason = "16 bits in tenths")]
     fn vitals(&self) -> Vitals {
-        let Some(drive) = self.drive else { return Vitals::default() };
+        let Some(drive) = self.feedback() else { return Vitals::default() };
         let calibrates = CALIBRATION_CODE * u8::from(drive.status == Status::Calibration);
         let codes = [code_from(32, self.reported), drive.fault_code(), calibrates];
         Vitals {

@@ -66,10 +66,7 @@ impl Command {
     pub fn encode(self, model: &Model, host: u8, id: u8) -> CanFrame {
         let one = [1, 0, 0, 0, 0, 0, 0, 0];
         let (kind, middle, data) = match self {
-            Self::Operation(command) => {
-                let (data, torque) = model.ranges().encode_wide(&command);
-                (1, torque.to_be_bytes(), data)
-            }
+            Self::Operation(command) => return operation(&command, model, id),
             Self::Enable => (3, [0, host], [0; 8]),
             Self::Disable => (4, [0, host], [0; 8]),
             Self::ClearFaults => (4, [0, host], one),
@@ -84,6 +81,12 @@ impl Command {
         let [high, low] = middle;
         CanFrame::of(extended_id(u32::from_be_bytes([kind, high, low, id])), data)
     }
+}
+
+pub(super) fn operation(command: &Impedance, model: &Model, id: u8) -> CanFrame {
+    let (data, torque) = model.ranges().encode_wide(command);
+    let [high, low] = torque.to_be_bytes();
+    CanFrame::of(extended_id(u32::from_be_bytes([1, high, low, id])), data)
 }
 
 fn parameter(register: Register, [a, b, c, d]: [u8; 4]) -> [u8; 8] {
@@ -141,21 +144,26 @@ impl Feedback {
     /// Reads a frame of feedback; `None` for any other frame, and for an unknown state.
     #[must_use]
     pub fn decode(frame: &CanFrame, model: &Model) -> Option<Self> {
-        let raw = raw_of(frame)?;
-        let [kind, state, id, _] = raw.to_be_bytes();
-        if kind != FEEDBACK || frame.length() != 8 {
-            return None;
-        }
-        let status = Status::of(state >> 6)?;
+        is_feedback(frame).then(|| Self::of(frame, model))
+    }
+
+    /// Reads a frame that is known to be feedback.
+    #[inline]
+    pub(super) const fn of(frame: &CanFrame, model: &Model) -> Self {
+        let [_, state, id, _] = frame.header().to_be_bytes();
         let [a, b, c, d, e, f, g, h] = *frame.bytes();
-        Some(Self {
-            status,
+        Self {
+            status: match state >> 6 {
+                0 => Status::Reset,
+                1 => Status::Calibration,
+                _ => Status::Run,
+            },
             faults: state & 0x3F,
             id,
             measured: model.ranges().decode_wide(&[a, b, c, d, e, f]),
             is_at_end: matches!([a, b], [0, 0] | [0xFF, 0xFF]),
-            temperature_c: f32::from(i16::from_be_bytes([g, h])) / 10.0,
-        })
+            temperature_c: i16::from_be_bytes([g, h]) as f32 / 10.0,
+        }
     }
 
     /// Returns the angle of the output shaft; `None` at an end of the range.
@@ -184,10 +192,10 @@ pub enum Status {
     Run = 2,
 }
 
-impl Status {
-    fn of(bits: u8) -> Option<Self> {
-        [Self::Reset, Self::Calibration, Self::Run].get(usize::from(bits)).copied()
-    }
+/// Tells whether a frame is feedback, with a known state.
+pub(super) fn is_feedback(frame: &CanFrame) -> bool {
+    let [kind, state, ..] = raw_of(frame).unwrap_or(0).to_be_bytes();
+    kind == FEEDBACK && state >> 6 <= Status::Run as u8 && frame.length() == 8
 }
 
 /// The types of frames from a drive: feedback, a parameter, and its faults as the manual counts their bits.

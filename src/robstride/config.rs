@@ -83,8 +83,7 @@ impl Mode {
         if !self.control.is_impedance() {
             ConfigError::check_limit("current limit in A", self.current_a, model.current_a())?;
         }
-        let is_measured = self.control.number == CURRENT;
-        let most_nm = if is_measured { f32::MAX } else { model.tmax_nm() };
+        let most_nm = if self.control.number == CURRENT { f32::MAX } else { model.tmax_nm() };
         self.control.check(model.vmax_rad_per_s(), 0.0, most_nm)
     }
 

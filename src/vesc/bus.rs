@@ -197,11 +197,12 @@ impl DriveProtocol for Motor {
             return Ingest::Unrelated;
         }
         // What `decode_answer` has not taken: the motion, and damaged frames.
-        if self.take(packet, frame.data()) {
-            Ingest::Taken
-        } else {
-            Ingest::WrongLength(frame.length())
+        if packet != MOTION || frame.length() != 8 {
+            return Ingest::WrongLength(frame.length());
         }
+        self.feedback.take_motion(frame.bytes());
+        self.angle_age = self.angle_age.saturating_add(1);
+        Ingest::Taken
     }
 
     fn velocity(&self) -> AngularVelocity {
@@ -289,6 +290,7 @@ impl DriveProtocol for Motor {
         if self.has_encoder { capabilities.with(Capability::AbsoluteAngle) } else { capabilities }
     }
 
+    #[inline]
     fn vitals(&self) -> Vitals {
         let drive = &self.feedback;
         let celsius = match (drive.driver_c, drive.motor_c) {

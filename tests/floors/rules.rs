@@ -146,7 +146,6 @@ const COUNTS: [(&str, &str, &[&str]); 25] = [
     ("odrive", "estimates that are asked for", &["age_s", "rests"]),
     ("odrive", "heartbeats that are asked for", &["silence_s"]),
     ("odrive", "frames that clear errors, frames that show a refusal", &["clears", "refused"]),
-    ("rmd", "the angle of the shaft", &["way"]),
     ("rmd", "commands without feedback, and writes of a memory that wears", &["silent", "writes"]),
     ("robstride", "questions, and turns of the shaft", &["questions", "turn"]),
     (

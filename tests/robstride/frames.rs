@@ -13,7 +13,7 @@ const FEEDBACK: u32 = 0x0280_01FD;
 fn a_frame_of_another_length_changes_nothing() {
     let mut bench = Bench::new(operation());
     bench.steps(20, |_| {});
-    let before = *bench.own.motor().feedback().unwrap();
+    let before = bench.own.motor().feedback().unwrap();
     let now = bench.now();
     for length in 0..8_u8 {
         for raw in [FEEDBACK, 0x1100_01FD, 0x1500_01FD] {
@@ -24,7 +24,7 @@ fn a_frame_of_another_length_changes_nothing() {
             assert_eq!(outcome, Ingest::WrongLength(length), "{raw:X}");
         }
     }
-    assert_eq!(*bench.own.motor().feedback().unwrap(), before);
+    assert_eq!(bench.own.motor().feedback().unwrap(), before);
     assert_eq!(bench.own.motor().reported_faults(), 0);
 }
 
@@ -32,18 +32,18 @@ fn a_frame_of_another_length_changes_nothing() {
 fn a_state_that_no_drive_has_changes_nothing() {
     let mut bench = Bench::new(operation());
     bench.steps(20, |_| {});
-    let before = *bench.own.motor().feedback().unwrap();
+    let before = bench.own.motor().feedback().unwrap();
     let now = bench.now();
     let outcome = Devices::ingest(&mut bench.own, &extended(0x02C0_01FD, [0xFF; 8]), now);
     assert_eq!(outcome, Ingest::WrongField);
-    assert_eq!(*bench.own.motor().feedback().unwrap(), before);
+    assert_eq!(bench.own.motor().feedback().unwrap(), before);
 }
 
 #[test]
 fn frames_of_others_are_not_taken() {
     let mut bench = Bench::new(operation());
     bench.steps(20, |_| {});
-    let before = *bench.own.motor().feedback().unwrap();
+    let before = bench.own.motor().feedback().unwrap();
     let now = bench.now();
     for frame in [
         extended(0x0280_02FD, [0xFF; 8]), // another motor
@@ -55,7 +55,7 @@ fn frames_of_others_are_not_taken() {
     ] {
         assert_eq!(Devices::ingest(&mut bench.own, &frame, now), Ingest::Unrelated, "{frame:?}");
     }
-    assert_eq!(*bench.own.motor().feedback().unwrap(), before);
+    assert_eq!(bench.own.motor().feedback().unwrap(), before);
 }
 
 /// The answer about the firmware has the id of feedback: as feedback it would be a shaft that turns fast at the lower end.
@@ -63,12 +63,12 @@ fn frames_of_others_are_not_taken() {
 fn the_answer_about_the_firmware_is_no_feedback() {
     let mut bench = Bench::new(operation());
     bench.steps(20, |_| {});
-    let before = *bench.own.motor().feedback().unwrap();
+    let before = bench.own.motor().feedback().unwrap();
     let answer = bench.drive.hear(&extended(0x0400_FD01, [0, 0xC4, 0, 0, 0, 0, 0, 0])).unwrap();
     assert_eq!(answer.header() >> 24 & 0x1F, 2);
     let now = bench.now();
     assert_eq!(Devices::ingest(&mut bench.own, &answer, now), Ingest::Taken);
-    assert_eq!(*bench.own.motor().feedback().unwrap(), before);
+    assert_eq!(bench.own.motor().feedback().unwrap(), before);
 }
 
 /// What a tool reads or writes while the motor waits is not taken for an answer to its own question.

@@ -9,7 +9,9 @@ use drivetrain::control::{Pid, PidConfig};
 use drivetrain::damiao::{Model, Motor};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::Impedance;
-use drivetrain::motor::{Actuator, Devices, ImpedanceControl, Ingest, VelocityDrive};
+use drivetrain::motor::{
+    Actuator, Devices, DriveProtocol, ImpedanceControl, Ingest, VelocityDrive,
+};
 use drivetrain::sim::{DamiaoDrive, Drive};
 use drivetrain::time::{Duration, Instant, Tick, TimeStep};
 use drivetrain::units::AngularVelocity;
@@ -118,6 +120,13 @@ fn joints_ingest_alone(joint: &mut Actuator<Motor>, answer: &CanFrame, now: Inst
     _ = Devices::ingest(joint, answer, now);
 }
 
+/// One frame by the codec of its motor alone, without its route and the rules of an actuator.
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn joints_decode(motor: &mut Motor, answer: &CanFrame) {
+    assert!(motor.decode(answer) == Ingest::Taken);
+}
+
 /// A joint without link, arming, ages, health or power: what the rules of a motor cost is the difference.
 pub struct Bare {
     measured: mit::Feedback,
@@ -192,6 +201,14 @@ fn ingest_alone() -> u32 {
     instructions(function, |ingest, _| ingest(joint, &answer, now))
 }
 
+fn decode() -> u32 {
+    let Arm { joints, answers, .. } = Arm::new(false, true, 1, START);
+    let ([joint, ..], [Some(answer), ..]) = (joints, answers) else { return u32::MAX };
+    let mut motor = *joint.motor();
+    let function = joints_decode as fn(&mut Motor, &CanFrame);
+    instructions(function, |decode, _| decode(&mut motor, &answer))
+}
+
 pub fn rows() {
     row("joints_tick", &[tick(false, true)]);
     row("joints_bare", &[bare()]);
@@ -199,6 +216,7 @@ pub fn rows() {
     row("joints_disarmed", &[tick(false, false)]);
     row("joints_ingest", &[ingest(false, 1, START)]);
     row("joints_ingest_alone", &[ingest_alone()]);
+    row("joints_decode", &[decode()]);
     row("joints_ingest_shared", &[ingest(true, 1, START)]);
     let mut frames = [0; UP_TIMES.len()];
     for (figure, (from, start)) in frames.iter_mut().zip((1..).zip(UP_TIMES)) {

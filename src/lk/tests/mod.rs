@@ -49,12 +49,12 @@ fn a_command_reads_like_a_command_and_feedback_does_not() {
         Command::ClearErrors,
     ] {
         let data = command.encode();
-        assert!(is_command(&data, 100), "{command:?}");
+        assert!(is_command(&data, || 100), "{command:?}");
         let warm = [data[0], 1, data[2], data[3], data[4], data[5], data[6], data[7]];
-        assert!(!is_command(&warm, 100), "{command:?}");
+        assert!(!is_command(&warm, || 100), "{command:?}");
     }
-    assert!(!is_command(&[0xA1, 0, 0, 0, 5, 0, 1, 0], 0), "feedback with an encoder");
-    assert!(!is_command(&[0xA2, 0, 101, 0, 5, 0, 1, 0], 100), "feedback with a current");
+    assert!(!is_command(&[0xA1, 0, 0, 0, 5, 0, 1, 0], || 0), "feedback with an encoder");
+    assert!(!is_command(&[0xA2, 0, 101, 0, 5, 0, 1, 0], || 100), "feedback with a current");
 }
 
 #[test]
