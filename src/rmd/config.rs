@@ -13,9 +13,9 @@ const TIMEOUT_MS: u32 = 100;
 
 /// A motor of this family, in one control mode: see the [module](super).
 ///
-/// Costs 4704 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
+/// Costs 4271 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
 ///
-/// Costs 192 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
+/// Costs 148 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
 ///
 /// # Examples
 /// ```

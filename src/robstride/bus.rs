@@ -24,9 +24,9 @@ const COMMANDS: [(u32, u32); 3] =
 
 /// A motor of this family in a run mode: see the [module](super).
 ///
-/// Costs 4972 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
+/// Costs 3944 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
 ///
-/// Costs 204 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
+/// Costs 137 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
 ///
 /// # Examples
 /// ```
@@ -342,7 +342,7 @@ impl DriveProtocol for Motor {
         if self.model.knows_angle() { known.with(Capability::AbsoluteAngle) } else { known }
     }
 
-    #[inline]
+    #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "16 bits in tenths")]
     fn vitals(&self) -> Vitals {
         let Some(drive) = self.feedback() else { return Vitals::default() };

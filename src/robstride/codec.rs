@@ -148,7 +148,7 @@ impl Feedback {
     }
 
     /// Reads a frame that is known to be feedback.
-    #[inline]
+    #[inline(always)]
     pub(super) const fn of(frame: &CanFrame, model: &Model) -> Self {
         let [_, state, id, _] = frame.header().to_be_bytes();
         let [a, b, c, d, e, f, g, h] = *frame.bytes();

@@ -368,8 +368,8 @@ impl Standstill {
     /// Returns whether the clock stands; true once for each full count.
     pub(super) const fn take(&mut self) -> bool {
         let a_frame = if self.limit < FRAMES { 1 } else { self.limit / FRAMES };
-        let stands =
-            self.readings >= self.limit || self.frames.saturating_mul(a_frame) >= self.limit;
+        let of_frames = self.frames.saturating_mul(a_frame);
+        let stands = self.readings >= self.limit || of_frames >= self.limit;
         if stands {
             (self.readings, self.frames) = (0, 0);
         }

@@ -28,9 +28,9 @@ const ORDERS: u8 = 50;
 
 /// A motor on a VESC, in a control mode: see the [module](super).
 ///
-/// Costs 4251 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
+/// Costs 3980 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
 ///
-/// Costs 174 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
+/// Costs 140 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
 ///
 /// # Examples
 /// ```

@@ -220,6 +220,7 @@ impl Ranges {
     }
 
     /// Reads feedback with 16 bits a field.
+    #[inline(always)]
     pub(crate) const fn decode_wide(&self, data: &[u8; 6]) -> Feedback {
         let [a, b, c, d, e, f] = *data;
         Feedback {

@@ -114,7 +114,7 @@ const TIMES_OF_DRIVES: [(&str, &str, &str); 26] = [
 ];
 
 /// Fields that count, by folder: what they count.
-const COUNTS: [(&str, &str, &[&str]); 25] = [
+const COUNTS: [(&str, &str, &[&str]); 24] = [
     ("dji", "no count: gains of a configuration, a current in its unit", &["current", "kd", "ki"]),
     ("lk", "no count: a current in its unit", &["current"]),
     ("snake", "no count: a bit for each joint", &["reads", "returned", "stops", "writes"]),

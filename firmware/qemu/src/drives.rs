@@ -246,22 +246,28 @@ pub fn rows() {
     });
 
     let model = robstride::Model::RS02;
-    measure(["robstride_tick", "robstride_ingest", "constant_ingest_robstride", "robstride_decode"], |ids, start| {
-        let motors = ids.map(|id| robstride::Motor::new(model, id, torque()).unwrap());
-        let drives = ids.map(|id| RobStrideDrive::of(model, id));
-        Group::new(motors, drives, start)
-    });
+    measure(
+        ["robstride_tick", "robstride_ingest", "constant_ingest_robstride", "robstride_decode"],
+        |ids, start| {
+            let motors = ids.map(|id| robstride::Motor::new(model, id, torque()).unwrap());
+            let drives = ids.map(|id| RobStrideDrive::of(model, id));
+            Group::new(motors, drives, start)
+        },
+    );
 
     let (model, firmware) = (odrive::Model::D6374, odrive::Firmware::V0_6);
     let fastest = AngularVelocity::from_rad_per_s(20.0);
-    measure(["odrive_tick", "odrive_ingest", "constant_ingest_odrive", "odrive_decode"], |ids, start| {
-        let motors =
-            ids.map(|id| odrive::Motor::new(model, firmware, id, fastest, torque()).unwrap());
-        let drives = ids.map(|id| {
-            OdriveDrive::new(id, true, model.torque_constant(), 1.0).with_periods(0.1, 0.001)
-        });
-        Group::new(motors, drives, start)
-    });
+    measure(
+        ["odrive_tick", "odrive_ingest", "constant_ingest_odrive", "odrive_decode"],
+        |ids, start| {
+            let motors =
+                ids.map(|id| odrive::Motor::new(model, firmware, id, fastest, torque()).unwrap());
+            let drives = ids.map(|id| {
+                OdriveDrive::new(id, true, model.torque_constant(), 1.0).with_periods(0.1, 0.001)
+            });
+            Group::new(motors, drives, start)
+        },
+    );
 
     let model = vesc::Model {
         name: "hub",
