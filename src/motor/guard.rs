@@ -116,6 +116,11 @@ impl Guard {
         gap_us > SILENCE_US && gap_us > self.device.timeouts().late_us()
     }
 
+    /// Tells whether a motor without feedback for so long is offline, though no update noticed that.
+    pub(crate) const fn is_offline_by(&self, gap_us: u32) -> bool {
+        gap_us > self.device.timeouts().offline_us()
+    }
+
     /// Changes the motor, and notes the consequences.
     pub(super) fn change<T>(
         &mut self,

@@ -14,9 +14,6 @@ use crate::motor::{
 use crate::time::Duration;
 use crate::units::{Angle, AngularVelocity};
 
-/// The code of a drive in calibration.
-const CALIBRATION_CODE: u8 = 1;
-
 /// The bits of an id for the target of a command and for its type. Some bits of the type are left out: 1, 3, 17 and 19; 4 to 7; 18
 /// and 22.
 const COMMANDS: [(u32, u32); 3] =
@@ -24,7 +21,7 @@ const COMMANDS: [(u32, u32); 3] =
 
 /// A motor of this family in a run mode: see the [module](super).
 ///
-/// Costs 3944 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
+/// Costs 3942 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
 ///
 /// Costs 137 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
 ///
@@ -345,9 +342,10 @@ impl DriveProtocol for Motor {
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "16 bits in tenths")]
     fn vitals(&self) -> Vitals {
-        let Some(drive) = self.feedback() else { return Vitals::default() };
-        let calibrates = CALIBRATION_CODE * u8::from(drive.status == Status::Calibration);
-        let codes = [code_from(32, self.reported), drive.fault_code(), calibrates];
+        let reported = code_from(32, self.reported);
+        let Some(drive) = self.feedback() else { return Vitals::of_errors([reported], 0) };
+        // A drive in calibration has the code 1.
+        let codes = [reported, drive.fault_code(), u8::from(drive.status == Status::Calibration)];
         Vitals {
             temperature_c: Some(drive.temperature_c as i16),
             effort: self.mode.control.effort(),

@@ -226,9 +226,9 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// left out is an overrun; a step with a `dt_s` of 0 stays. So two runners can wait for each other:
     /// `let (Some(one), Some(other)) = (one.due(), other.due()) else { continue };` loses none.
     ///
-    /// Costs 122 instructions on a Cortex-M4F, when a step is due (`docs/figures.md`).
+    /// Costs 125 instructions on a Cortex-M4F, when a step is due (`docs/figures.md`).
     ///
-    /// Costs 129 instructions on a Cortex-M4F, when none is due (`docs/figures.md`).
+    /// Costs 132 instructions on a Cortex-M4F, when none is due (`docs/figures.md`).
     pub fn due(&mut self) -> Option<Tick> {
         let now = self.read_clock();
         if self.watch.standstill.take() {

@@ -33,8 +33,8 @@
 //! * again each 100 ms while a joint is relaxed: a drive may have missed the frame.
 //!
 //! A relaxed joint is always disabled before the next bring-up, for any cause and after any time, even if armed before the next update. The
-//! order of writes is mode, current, acceleration, deceleration, speed, target, enable: a joint is enabled with a target at most one turn of
-//! writes old (12 ms of 12 joints at 1 kHz). Then the target is repeated, which bounds the effect of a lost frame: in its turn as long as new
+//! order of writes is mode, current, acceleration, deceleration, speed, target, enable: a joint is enabled with a target one turn of writes
+//! old (12 ms of 12 joints at 1 kHz), and older while the driver refuses the enable. Then the target is repeated, which bounds the effect of a lost frame: in its turn as long as new
 //! targets leave room, and with the first check of ages after 100 ms as a new target. The enable is never repeated. A drive that lost its supply for less than *late* stays disabled, is
 //! detected ([`State::resets`]), and waits to be armed. After a longer loss, the joint was late and is brought up from the beginning, with its
 //! zero up to 100 ms, and to be armed after that.
@@ -45,9 +45,9 @@
 //!
 //! | condition | holds while | the joint |
 //! |---|---|---|
-//! | late, offline | there is no fresh position; the joint is lost, until ten positions in a row | is disabled; waits to be armed after *offline* |
+//! | late, offline | there is no fresh position; the joint is lost, until ten positions in a row | is disabled; waits to be armed after *offline*, or 100 ms (and *late*) without a position |
 //! | ESC fault | the joint was found disabled before *late*, or further off than possible, until armed | is disabled, waits to be armed |
-//! | position uncertain | the drive may have lost its zero, until the zero is set | goes on |
+//! | position uncertain | the drive may have lost its zero, until the zero is set | was relaxed by the loss; goes on once armed |
 //! | stalled | the joint is away from its target and does not move: blocked in either direction | as configured; goes on |
 //! | command lost | the application let the target expire | is disabled, until the next target |
 //! | second master | another node wrote to the joint or polled it within the last second | goes on, and is not armed |

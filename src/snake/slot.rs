@@ -329,11 +329,9 @@ impl Slot {
     }
 
     /// Takes back a write that was not sent: its turn comes again, and then the turns of the registers behind it. Registers before it in
-    /// the sequence keep their places, but a new target goes before the enable.
+    /// the sequence keep their places.
     pub(super) fn take_back(&mut self, register: Register) {
-        let bit = self.renew(register);
-        let first = if bit == LAST { LAST >> 1 } else { bit };
-        self.ahead |= first.wrapping_neg();
+        self.ahead |= self.renew(register).wrapping_neg();
     }
 
     /// Marks a register for a write; returns its bit.

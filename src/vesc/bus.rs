@@ -28,9 +28,9 @@ const ORDERS: u8 = 50;
 
 /// A motor on a VESC, in a control mode: see the [module](super).
 ///
-/// Costs 3980 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
+/// Costs 4012 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
 ///
-/// Costs 140 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
+/// Costs 144 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
 ///
 /// # Examples
 /// ```
@@ -197,7 +197,7 @@ impl DriveProtocol for Motor {
             return Ingest::Unrelated;
         }
         // What `decode_answer` has not taken: the motion, and damaged frames.
-        if packet != MOTION || frame.length() != 8 {
+        if packet != MOTION || frame.data().len() != 8 {
             return Ingest::WrongLength(frame.length());
         }
         self.feedback.take_motion(frame.bytes());

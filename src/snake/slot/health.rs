@@ -48,7 +48,8 @@ impl Slot {
         self.was_led = is_up(self);
         measure_rate(self, raw, now);
         if !self.guard.hear_in_time(now) {
-            if was_heard && self.guard.is_silence(gap_us) {
+            let is_lost = self.guard.is_silence(gap_us) || self.guard.is_offline_by(gap_us);
+            if was_heard && is_lost {
                 self.lose_zero(now);
                 self.guard.relax_until_armed();
             }

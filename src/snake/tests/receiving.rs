@@ -79,6 +79,10 @@ fn a_zero_is_lost_in_a_silence_of_which_a_stalled_loop_knows_nothing() {
     assert_eq!(turns_unheard(&mut homed(), 900, true, 61_000), (true, false));
     assert_eq!(turns_unheard(&mut homed(), 101, true, 0), (true, false), "as an offline joint");
     assert!(!turns_unheard(&mut homed(), 99, true, 0).0);
+    for (silent_ms, is_lost) in [(49, false), (51, true)] {
+        let timeouts = timeouts(20, 50);
+        assert_eq!(turns_unheard(&mut homed_with(timeouts), silent_ms, true, 0).0, is_lost);
+    }
 }
 
 #[test]
