@@ -96,7 +96,7 @@ impl Watch {
         self.reversals = self.reversals.saturating_add(1);
         self.edges.begin(BusCondition::ClockReversal, now);
         // Counted once, in the reading or in the tick.
-        self.ticked = None;
+        self.ticked = self.ticked.filter(|ticked| *ticked < now);
         self.reading = now;
     }
 
@@ -482,6 +482,22 @@ mod tests {
             assert!(told.into_iter().any(|edge| edge.condition == Condition::ClockFault));
             assert_eq!(runner.due(), None);
         }
+    }
+
+    #[test]
+    fn zeros_are_sent_by_a_clock_that_stands_behind_a_reading_and_before_a_step_left_out() {
+        let clock = Cell::<Instant>::default();
+        let mut runner = driving(&clock).with_standstill_after(50);
+        clock.set(at_us(11_000));
+        assert!(runner.due().is_some(), "left out");
+        for reading in [11_900, 11_500] {
+            clock.set(at_us(reading));
+            assert!(runner.due().is_some_and(|tick| tick.dt_s() > 0.0));
+        }
+        let stopped = (0..60).find_map(|_| runner.due().filter(|tick| tick.dt_s() == 0.0)).unwrap();
+        assert_eq!(stopped.now(), at_us(10_000), "the last step that was run");
+        runner.tick(stopped);
+        assert!(!runner.is_armed());
     }
 
     /// `let (Some(one), Some(other)) = (one.due(), other.due()) else { continue };` with a clock that advances in
