@@ -220,7 +220,7 @@ fn a_silent_joint_is_stopped_by_the_first_update_after_ten_milliseconds_whatever
     }
 }
 
-/// A question for one register that was given up says nothing of those for another.
+/// A time-out of a question for one register leaves the questions for other registers outstanding.
 #[test]
 fn a_reply_settles_its_register_and_a_question_given_up_is_of_its_register_alone() {
     let mut bench = Bench::new(&[3]);

@@ -31,7 +31,7 @@ fn reply(id: u8, register: Register, value: i32) -> CanFrame {
     frame(id, &register.reply(value))
 }
 
-/// Joints that answer at once, with drives that stand where they are told to stand.
+/// Joints with simulated drives: each drive stands at a set place, and answers at once.
 struct Bench {
     joints: Joints,
     handles: Vec<Joint>,
@@ -73,6 +73,27 @@ impl Bench {
             self.answer(id, command);
         }
         sent
+    }
+
+    /// Takes frames as a driver with room for so many, and has them answered. The first frame without room comes back, or all of them.
+    fn take_some(&mut self, room: usize, all_come_back: bool) -> Vec<(u8, Command)> {
+        let mut taken = Vec::new();
+        let mut refused = Vec::new();
+        while let Some(frame) = self.joints.next_frame() {
+            if taken.len() == room {
+                refused.push(frame);
+                if !all_come_back {
+                    break;
+                }
+                continue;
+            }
+            let id = u8::try_from(frame.header()).unwrap();
+            let command = Command::decode(frame.data()).unwrap();
+            self.answer(id, command);
+            taken.push((id, command));
+        }
+        assert!(refused.iter().all(|frame| self.joints.requeue(frame)));
+        taken
     }
 
     /// Joint 1 says something.

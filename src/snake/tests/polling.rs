@@ -125,27 +125,6 @@ fn a_driver_that_takes_one_frame_a_tick_starves_no_joint() {
     assert!(asked.iter().all(|count| *count > 20), "{asked:?}");
 }
 
-/// Hands an update to a driver with room for so many frames, and has them answered. The first frame without room comes back, or all of them.
-fn take_some(bench: &mut Bench, room: usize, all_come_back: bool) -> Vec<(u8, Command)> {
-    let mut taken = Vec::new();
-    let mut refused = Vec::new();
-    while let Some(frame) = bench.joints.next_frame() {
-        if taken.len() == room {
-            refused.push(frame);
-            if !all_come_back {
-                break;
-            }
-            continue;
-        }
-        let id = u8::try_from(frame.header()).unwrap();
-        let command = Command::decode(frame.data()).unwrap();
-        bench.answer(id, command);
-        taken.push((id, command));
-    }
-    assert!(refused.iter().all(|frame| bench.joints.requeue(frame)));
-    taken
-}
-
 /// Hostile readers had no question sent, joint 12 written nothing, and joints asked for anything but their position, where
 /// an update has more frames than the driver has room for.
 #[test]
@@ -167,7 +146,7 @@ fn a_driver_with_less_room_than_an_update_has_frames_starves_no_joint() {
                 _ = bench.joints.set_pulses(joint, 1_000);
             }
             bench.joints.update(Tick::new(at_ms(bench.ms), 0.001));
-            for (id, command) in take_some(&mut bench, room, all_come_back) {
+            for (id, command) in bench.take_some(room, all_come_back) {
                 let is_read = matches!(command, Command::Read(_));
                 let counts = if is_read { &mut asked } else { &mut written };
                 counts[usize::from(id - 1)] += 1;
@@ -193,7 +172,7 @@ fn a_program_that_disarms_in_each_tick_disables_all_and_floods_nobody() {
             bench.ms += step_ms;
             bench.joints.disarm();
             bench.joints.update(Tick::new(at_ms(bench.ms), 0.001));
-            for (_, command) in take_some(&mut bench, room, false) {
+            for (_, command) in bench.take_some(room, false) {
                 disables += usize::from(command == Command::DISABLE);
                 questions += usize::from(matches!(command, Command::Read(_)));
             }
@@ -327,7 +306,7 @@ fn a_detached_joint_is_disabled_once_and_not_asked_whatever_waits_or_comes_back(
     assert_eq!(returns, once);
 }
 
-/// Without its turn, a joint that missed its last target would stay where it is as long as another one moves.
+/// A drive may have missed its last target. Without a turn of its own, the joint would stand until the other joint stops.
 #[test]
 fn a_target_that_does_not_change_is_repeated_beside_one_that_changes_in_each_update() {
     for (writes, room) in [(1, usize::MAX), (2, 1)] {
@@ -343,12 +322,30 @@ fn a_target_that_does_not_change_is_repeated_beside_one_that_changes_in_each_upd
                 bench.joints.set_pulses(joint, pulses).unwrap();
             }
             bench.joints.update(Tick::new(at_ms(bench.ms), 0.001));
-            for (id, command) in take_some(&mut bench, room, false) {
+            for (id, command) in bench.take_some(room, false) {
                 let is_target = matches!(command, Command::Write(Register::Position, _));
                 written[usize::from(id - 1)] += u32::from(is_target);
             }
         }
         let [moving, holding @ ..] = written;
         assert!(moving > 90 && holding.iter().all(|count| *count >= 3), "{writes}: {written:?}");
+    }
+}
+
+/// An enable that waits for a newer target is refused for ever by a driver whose room has the same rhythm.
+#[test]
+fn a_driver_with_room_for_one_frame_a_tick_enables_all_joints() {
+    for (ids, most) in [(&[4][..], 100), (&[4, 5], 100), (&[1, 2, 3, 4, 5, 6], 300)] {
+        let mut bench = Bench::armed(ids);
+        for tick in 0..most {
+            bench.ms += 1;
+            for joint in bench.handles.clone() {
+                _ = bench.joints.set_pulses(joint, tick);
+            }
+            bench.joints.update(Tick::new(at_ms(bench.ms), 0.001));
+            bench.take_some(1, false);
+        }
+        let enabled: i32 = bench.enabled.iter().sum();
+        assert_eq!(usize::try_from(enabled).unwrap(), ids.len(), "{ids:?}");
     }
 }

@@ -180,19 +180,11 @@ fn a_joint_that_got_settings_while_it_is_brought_up_is_disabled_all_the_same() {
     assert_eq!(writes(&bench.run(1)), [Command::DISABLE]);
 }
 
-/// What a driver with room for `room` frames takes of an update without a step, some milliseconds on.
+/// Makes an update without a step after so many ms, for a driver with room for so many frames.
 fn held(bench: &mut Bench, room: usize, ms: u64) -> Vec<(u8, Command)> {
     bench.ms += ms;
     bench.joints.update(Tick::new(at_ms(bench.ms), f32::NAN));
-    let mut taken = Vec::new();
-    while let Some(frame) = bench.joints.next_frame() {
-        if taken.len() == room {
-            assert!(bench.joints.requeue(&frame));
-            break;
-        }
-        taken.push((u8::try_from(frame.header()).unwrap(), Command::decode(frame.data()).unwrap()));
-    }
-    taken
+    bench.take_some(room, false)
 }
 
 /// A hostile reader had joints go on for ever whose disable was refused, or waited for an answer, while the updates had no
@@ -239,7 +231,7 @@ fn an_update_without_a_step_asks_nobody() {
     assert_eq!(bench.take(), []);
 }
 
-/// An update that comes too late and has no step knows no more of the joints than one that comes again without it.
+/// In a late update without a step, the positions are as old as in a second update without a step: no joint may move.
 #[test]
 fn an_update_without_a_step_that_is_late_moves_no_joint() {
     for (gap_ms, moves) in [(40, true), (41, false), (10_000, false)] {
