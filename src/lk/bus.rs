@@ -188,6 +188,7 @@ impl DriveProtocol for Motor {
         let Some(phase) = feedback.phase(&self.model) else {
             return Ingest::WrongField;
         };
+        // The low 16 bits are the phase before.
         let [low, high, ..] = self.rotor.to_le_bytes();
         let way = phase.wrapping_sub(u16::from_le_bytes([low, high])).cast_signed();
         self.rotor = if self.drive.is_some() { self.rotor + i64::from(way) } else { phase.into() };

@@ -162,7 +162,6 @@ impl Motor {
         Ok(())
     }
 
-    #[inline]
     fn frame_of(&self, command: Command) -> CanFrame {
         command.encode(&self.model, self.host, self.id)
     }

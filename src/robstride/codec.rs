@@ -83,6 +83,7 @@ impl Command {
     }
 }
 
+/// Writes the frame of an operation, apart from the other commands: it is the one of each tick.
 pub(super) fn operation(command: &Impedance, model: &Model, id: u8) -> CanFrame {
     let (data, torque) = model.ranges().encode_wide(command);
     let [high, low] = torque.to_be_bytes();

@@ -153,6 +153,7 @@ impl Motor {
     }
 
     /// Takes a status frame of this drive.
+    #[inline]
     fn take(&mut self, packet: u8, data: &[u8]) -> bool {
         if !self.feedback.take(packet, data) {
             return false;
@@ -197,12 +198,11 @@ impl DriveProtocol for Motor {
             return Ingest::Unrelated;
         }
         // What `decode_answer` has not taken: the motion, and damaged frames.
-        if packet != MOTION || frame.data().len() != 8 {
-            return Ingest::WrongLength(frame.length());
+        if packet == MOTION && self.take(MOTION, frame.data()) {
+            Ingest::Taken
+        } else {
+            Ingest::WrongLength(frame.length())
         }
-        self.feedback.take_motion(frame.bytes());
-        self.angle_age = self.angle_age.saturating_add(1);
-        Ingest::Taken
     }
 
     fn velocity(&self) -> AngularVelocity {

@@ -127,19 +127,16 @@ pub struct Feedback {
 }
 
 impl Feedback {
-    /// Takes status 1.
-    #[inline]
-    pub(super) fn take_motion(&mut self, &[a, b, c, d, e, f, g, h]: &[u8; 8]) {
-        self.erpm = Some(i32::from_be_bytes([a, b, c, d]));
-        self.current_a = Some(short([e, f]) / 10.0);
-        self.duty = Some(short([g, h]) / 1_000.0);
-    }
-
     /// Takes a status frame: bits 8 to 15 of its id, and its data. Returns `false`, and takes nothing, if the packet is no status or
     /// has another length than 8; status 5 of older firmware has 6.
+    #[inline]
     pub fn take(&mut self, packet: u8, data: &[u8]) -> bool {
         match (packet, data) {
-            (9, &[a, b, c, d, e, f, g, h]) => self.take_motion(&[a, b, c, d, e, f, g, h]),
+            (9, &[a, b, c, d, e, f, g, h]) => {
+                self.erpm = Some(i32::from_be_bytes([a, b, c, d]));
+                self.current_a = Some(short([e, f]) / 10.0);
+                self.duty = Some(short([g, h]) / 1_000.0);
+            }
             (14, &[a, b, c, d, e, f, g, h]) => {
                 self.charge_ah = Some([[a, b, c, d], [e, f, g, h]].map(long));
             }

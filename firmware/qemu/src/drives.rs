@@ -175,10 +175,27 @@ fn ingest<M: DriveProtocol>(
     }
 }
 
-/// One frame by the codec of its motor alone, without its route and the rules of an actuator.
 #[inline(never)]
 fn decode<M: DriveProtocol>(motor: &mut M, frame: &CanFrame) {
     assert!(motor.decode(frame) == Ingest::Taken);
+}
+
+/// Returns the instructions of a frame by the codec of its motor alone, without its route and the rules of an actuator.
+pub fn decoding<M: DriveProtocol + Copy>(motor: &Actuator<M>, frame: &CanFrame) -> u32 {
+    let mut motor = *motor.motor();
+    instructions(decode as fn(&mut M, &CanFrame), |decode, _| decode(&mut motor, frame))
+}
+
+/// The names of a family's rows.
+macro_rules! names {
+    ($family:literal) => {
+        [
+            concat!($family, "_tick"),
+            concat!($family, "_ingest"),
+            concat!("constant_ingest_", $family),
+            concat!($family, "_decode"),
+        ]
+    };
 }
 
 /// Prints the tick, and a frame of the feedback: of other ids after each up-time, too. Commands do not arrive here, so the drives repeat
@@ -214,10 +231,7 @@ fn measure<M: DriveProtocol + Copy + Debug, D: Drive>(
     row(names[0], &[figure]);
     row(names[1], &frames[..1]);
     row(names[2], &frames);
-    let function = decode as fn(&mut M, &CanFrame);
-    let [first, ..] = motors;
-    let mut motor = *first.motor();
-    row(names[3], &[instructions(function, |decode, _| decode(&mut motor, &feedback[0]))]);
+    row(names[3], &[decoding(&motors[0], &feedback[0])]);
 }
 
 fn ids(from: u8) -> [u8; MOTORS] {
@@ -232,42 +246,36 @@ fn torque() -> ImpedanceControl {
 
 pub fn rows() {
     let model = lk::Model::MF9025_16T;
-    measure(["lk_tick", "lk_ingest", "constant_ingest_lk", "lk_decode"], |ids, start| {
+    measure(names!("lk"), |ids, start| {
         let motors = ids.map(|id| lk::Motor::new(model, id, torque()).unwrap());
         let drives = ids.map(|id| LkDrive::of(model, id));
         Group::new(motors, drives, start)
     });
 
     let model = rmd::Model::X8_120;
-    measure(["rmd_tick", "rmd_ingest", "constant_ingest_rmd", "rmd_decode"], |ids, start| {
+    measure(names!("rmd"), |ids, start| {
         let motors = ids.map(|id| rmd::Motor::new(model, id, torque()).unwrap());
         let drives = ids.map(|id| RmdDrive::new(id, model.torque_constant()));
         Group::new(motors, drives, start)
     });
 
     let model = robstride::Model::RS02;
-    measure(
-        ["robstride_tick", "robstride_ingest", "constant_ingest_robstride", "robstride_decode"],
-        |ids, start| {
-            let motors = ids.map(|id| robstride::Motor::new(model, id, torque()).unwrap());
-            let drives = ids.map(|id| RobStrideDrive::of(model, id));
-            Group::new(motors, drives, start)
-        },
-    );
+    measure(names!("robstride"), |ids, start| {
+        let motors = ids.map(|id| robstride::Motor::new(model, id, torque()).unwrap());
+        let drives = ids.map(|id| RobStrideDrive::of(model, id));
+        Group::new(motors, drives, start)
+    });
 
     let (model, firmware) = (odrive::Model::D6374, odrive::Firmware::V0_6);
     let fastest = AngularVelocity::from_rad_per_s(20.0);
-    measure(
-        ["odrive_tick", "odrive_ingest", "constant_ingest_odrive", "odrive_decode"],
-        |ids, start| {
-            let motors =
-                ids.map(|id| odrive::Motor::new(model, firmware, id, fastest, torque()).unwrap());
-            let drives = ids.map(|id| {
-                OdriveDrive::new(id, true, model.torque_constant(), 1.0).with_periods(0.1, 0.001)
-            });
-            Group::new(motors, drives, start)
-        },
-    );
+    measure(names!("odrive"), |ids, start| {
+        let motors =
+            ids.map(|id| odrive::Motor::new(model, firmware, id, fastest, torque()).unwrap());
+        let drives = ids.map(|id| {
+            OdriveDrive::new(id, true, model.torque_constant(), 1.0).with_periods(0.1, 0.001)
+        });
+        Group::new(motors, drives, start)
+    });
 
     let model = vesc::Model {
         name: "hub",
@@ -283,7 +291,7 @@ pub fn rows() {
         ..model
     };
     let mode = vesc::Mode::current_with_speed_loop(SPEED_LOOP).unwrap();
-    measure(["vesc_tick", "vesc_ingest", "constant_ingest_vesc", "vesc_decode"], |ids, start| {
+    measure(names!("vesc"), |ids, start| {
         let motors = ids.map(|id| vesc::Motor::new(model, id, mode).unwrap());
         let drives = ids.map(|id| Vesc(VescDrive::of(motor, id), false));
         Group::new(motors, drives, start)

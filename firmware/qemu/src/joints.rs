@@ -1,6 +1,7 @@
 //! Eight joints of Damiao in MIT mode, as a program drives them: each an actuator with our speed loop.
 
 use crate::constant_time::UP_TIMES;
+use crate::drives;
 use crate::meter::instructions;
 use crate::report::row;
 use crate::wiring::START;
@@ -9,9 +10,7 @@ use drivetrain::control::{Pid, PidConfig};
 use drivetrain::damiao::{Model, Motor};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::Impedance;
-use drivetrain::motor::{
-    Actuator, Devices, DriveProtocol, ImpedanceControl, Ingest, VelocityDrive,
-};
+use drivetrain::motor::{Actuator, Devices, ImpedanceControl, Ingest, VelocityDrive};
 use drivetrain::sim::{DamiaoDrive, Drive};
 use drivetrain::time::{Duration, Instant, Tick, TimeStep};
 use drivetrain::units::AngularVelocity;
@@ -120,13 +119,6 @@ fn joints_ingest_alone(joint: &mut Actuator<Motor>, answer: &CanFrame, now: Inst
     _ = Devices::ingest(joint, answer, now);
 }
 
-/// One frame by the codec of its motor alone, without its route and the rules of an actuator.
-#[unsafe(no_mangle)]
-#[inline(never)]
-fn joints_decode(motor: &mut Motor, answer: &CanFrame) {
-    assert!(motor.decode(answer) == Ingest::Taken);
-}
-
 /// A joint without link, arming, ages, health or power: what the rules of a motor cost is the difference.
 pub struct Bare {
     measured: mit::Feedback,
@@ -204,9 +196,7 @@ fn ingest_alone() -> u32 {
 fn decode() -> u32 {
     let Arm { joints, answers, .. } = Arm::new(false, true, 1, START);
     let ([joint, ..], [Some(answer), ..]) = (joints, answers) else { return u32::MAX };
-    let mut motor = *joint.motor();
-    let function = joints_decode as fn(&mut Motor, &CanFrame);
-    instructions(function, |decode, _| decode(&mut motor, &answer))
+    drives::decoding(&joint, &answer)
 }
 
 pub fn rows() {
