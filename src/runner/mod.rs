@@ -121,7 +121,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
 
     /// Takes at most `budget` received frames from the driver; frames of others are dropped. Returns how many came.
     ///
-    /// Costs 550 instructions on a Cortex-M4F, for 8 frames of motors (`docs/figures.md`).
+    /// Costs 556 instructions on a Cortex-M4F, for 8 frames of motors (`docs/figures.md`).
     pub fn poll(&mut self, budget: usize) -> usize {
         self.poll_with(budget, |_| {})
     }
@@ -205,8 +205,8 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     ///
     /// A clock stands when too many readings in a row, by this method and by [`poll`](Self::poll), show no later time. The limit
     /// is learned from the running clock: 100 times the most readings ever needed to show a later time, and at least 2 for each
-    /// microsecond of its resolution; from 1000 to 200 000, and 200 000 until the clock has advanced once. 1600 received frames
-    /// count as much as the limit.
+    /// microsecond of its resolution; from 1000 to 200 000, and 200 000 until the clock has advanced twice. 1600 received frames
+    /// count as much as the limit, if they are more than a full bus carries within a step of the clock.
     ///
     /// | loop | resolution of the clock | the step comes after |
     /// |---|---|--:|
@@ -226,9 +226,9 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// left out is an overrun; a step with a `dt_s` of 0 stays. So two runners can wait for each other:
     /// `let (Some(one), Some(other)) = (one.due(), other.due()) else { continue };` loses none.
     ///
-    /// Costs 125 instructions on a Cortex-M4F, when a step is due (`docs/figures.md`).
+    /// Costs 112 instructions on a Cortex-M4F, when a step is due (`docs/figures.md`).
     ///
-    /// Costs 132 instructions on a Cortex-M4F, when none is due (`docs/figures.md`).
+    /// Costs 130 instructions on a Cortex-M4F, when none is due (`docs/figures.md`).
     pub fn due(&mut self) -> Option<Tick> {
         let now = self.read_clock();
         if self.watch.standstill.take() {

@@ -34,10 +34,11 @@
 //!
 //! A relaxed joint is always disabled before the next bring-up, for any cause and after any time, even if armed before the next update. The
 //! order of writes is mode, current, acceleration, deceleration, speed, target, enable: a joint is enabled with a target one turn of writes
-//! old (12 ms of 12 joints at 1 kHz), and older while the driver refuses the enable. Then the target is repeated, which bounds the effect of a lost frame: in its turn as long as new
-//! targets leave room, and with the first check of ages after 100 ms as a new target. The enable is never repeated. A drive that lost its supply for less than *late* stays disabled, is
-//! detected ([`State::resets`]), and waits to be armed. After a longer loss, the joint was late and is brought up from the beginning, with its
-//! zero up to 100 ms, and to be armed after that.
+//! old (12 ms of 12 joints at 1 kHz), and older while the driver refuses the enable. Then the target is repeated, which bounds the effect of a
+//! lost frame: in its turn as long as new targets leave room, and with the first check of ages after 100 ms as a new target. The enable is
+//! never repeated. A drive that lost its supply for less than *late* stays disabled, is detected ([`State::resets`]), and waits to be armed.
+//! After a longer loss, the joint was late: it is brought up from the beginning and keeps its zero, and after 100 ms loses its zero and waits
+//! to be armed.
 //!
 //! # Conditions
 //! Every change is an [`Edge`](crate::time::Edge) with its time, latched until [`Joints::next_edge`] reads it. [`Joints::health`] is the
