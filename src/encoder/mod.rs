@@ -129,7 +129,7 @@ pub(crate) struct Laps {
 }
 
 impl Laps {
-    /// Takes an unbounded position, and the range.
+    /// Takes an unbounded position, and the end of the range on both sides of zero.
     #[expect(clippy::cast_possible_truncation, reason = "saturates")]
     pub(crate) fn set(&mut self, position: f32, range: f32) {
         let laps = ((position.abs() + range) / (2.0 * range)) as i32;
@@ -137,7 +137,7 @@ impl Laps {
         self.laps = if position.abs() <= range { 0 } else { signed };
     }
 
-    /// Takes a reported position, in counts of 65535 a range: a way of more than half the range leads across its end.
+    /// Takes a reported position, in counts of 65535 from end to end: a way of more than half of them leads across an end.
     pub(crate) fn advance(&mut self, position: u16) {
         let way = i32::from(position) - i32::from(self.last.unwrap_or(position));
         let most = i32::from(u16::MAX / 2);

@@ -205,8 +205,9 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     ///
     /// A clock stands when too many readings in a row, by this method and by [`poll`](Self::poll), show no later time. The limit
     /// is learned from the running clock: 100 times the most readings ever needed to show a later time, and at least 2 for each
-    /// microsecond of its resolution; from 1000 to 200 000, and 200 000 until the clock has advanced twice. 1600 received frames
-    /// count as much as the limit, if they are more than a full bus carries within a step of the clock.
+    /// microsecond of its resolution; from 1000 to 200 000, and 200 000 until the clock has advanced twice. So a running clock does not count
+    /// as standing up to 2 000 000 readings a second. Received frames count too, 1600 of them as much as the limit, once a full bus
+    /// needs more than a step of the clock for the frames since the last step. The times below are those without a frame.
     ///
     /// | loop | resolution of the clock | the step comes after |
     /// |---|---|--:|
@@ -216,8 +217,9 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// | wakes up each 0.25 ms | 1 µs | 0.25 s |
     /// | wakes up each ms | 1 µs | 1 s; 2 s if never early or late |
     /// | the same | 1 ms | 2 s |
+    /// | the same | 10 ms | 20 s |
     /// | the same | of a clock that has never moved | 200 s |
-    /// | wakes up for each frame of 4 motors at 1 kHz | 1 µs | 0.15 s |
+    /// | wakes up for each frame of 4 motors at 1 kHz (with these frames) | 1 µs | 0.1 s |
     ///
     /// Slower loops set a limit of their own: [`with_standstill_after`](Self::with_standstill_after).
     ///

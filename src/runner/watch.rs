@@ -289,8 +289,8 @@ const READINGS_A_MICRO: u32 = 2;
 /// and more for these.
 const FRAMES: u32 = 1_600;
 
-/// A frame of 8 bytes takes longer than so many µs on a bus of 1 Mbit/s.
-const FRAME_US: u32 = 100;
+/// Any frame takes longer than so many µs on a bus of 1 Mbit/s.
+const FRAME_US: u32 = 40;
 
 /// Counts readings that show no later time, and learns their usual number.
 #[derive(Debug)]
@@ -356,7 +356,7 @@ impl Standstill {
         if self.readings <= self.longest && finest >= self.finest {
             return;
         }
-        // The first reading lay within a step of the clock.
+        // The first reading lay within a step of the clock. A step half as long as the one before is left to the next one.
         if difference == advance {
             return;
         }
