@@ -43,6 +43,7 @@ impl Reference {
             self.relax();
             self.arming = Arming::Armed;
             self.has_rested = true;
+            self.is_resting = true;
             self.open(now);
         }
         self.armed_at = self.armed_at.max(now);

@@ -124,7 +124,7 @@ impl Reference {
     /// Tells whether the output may be this one, after [`update`](Self::update).
     pub(crate) fn allows(&self, output: f64, Bounds { least, most }: Bounds) -> bool {
         let slack = self.rules.resolution;
-        let may_rest = self.rules.is_prepared && output == 0.0;
+        let may_rest = self.rules.is_prepared && self.is_resting && output == 0.0;
         may_rest || least - slack <= output && output <= most + slack
     }
 }

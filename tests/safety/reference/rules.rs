@@ -31,7 +31,8 @@ pub(crate) struct Rules {
     pub(crate) arms_later: bool,
     /// A request gives its time to targets, of a motor that is armed already as well.
     pub(crate) arms_again: bool,
-    /// Its drive is asked for settings and enabled first: it may rest where the reference drives, and refuse to be armed.
+    /// Its drive is asked for settings and enabled first: until it is driven it may
+    /// rest where the reference drives, and it may refuse to be armed.
     pub(crate) is_prepared: bool,
     /// So many unread edges have an order and a time of their own.
     pub(crate) room: usize,
