@@ -32,13 +32,16 @@
 //! # States
 //! The rules of all families have two states for each motor. The [`Link`] follows the age of the feedback, by the limits of [`Timeouts`]:
 //!
-//! | link | feedback is received | feedback is older than *late* | feedback is older than *offline* |
-//! |---|---|---|---|
-//! | unheard | online | | |
-//! | online | online | late | offline |
-//! | late | online | | offline |
-//! | offline | recovering, or online when one frame is enough | | |
-//! | recovering | online with the last of the good frames in a row | | offline |
+//! | link | feedback is received | feedback is older than *late* | feedback is older than *offline* | lost time |
+//! |---|---|---|---|---|
+//! | unheard | online | | | |
+//! | online | online | late | offline | late |
+//! | late | online | | offline | |
+//! | offline | recovering, or online when one frame is enough | | | |
+//! | recovering | online with the last of the good frames in a row | | offline | |
+//!
+//! Time is lost in an update that does not lie after the update before, or lies before the arming. After a pause of more than 60 s all
+//! feedback counts as older than *offline*. A motor without feedback is always online.
 //!
 //! The arming decides whether the motor takes targets: only an armed motor does.
 //!
