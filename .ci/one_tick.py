@@ -1,6 +1,7 @@
-"""Compares the files whose functions run in each cycle of tests/one_tick.rs with the lists in DESIGN.md, "One tick"."""
+"""Compares the files whose functions run in each cycle of tests/one_tick.rs, and their calls, with the lists in DESIGN.md, "One tick"."""
 
 import argparse
+import collections
 import json
 import pathlib
 import re
@@ -10,6 +11,8 @@ import sys
 CYCLES = 1000
 # The vocabulary, of which each file has a few functions for everybody.
 VOCABULARY = {"units", "math", "time", "frame"}
+# What calls the first file of each list, and the targets.
+PROGRAM = "tests/one_tick.rs"
 # The test of each way, its section in DESIGN.md, and its most files without the vocabulary. The bound of a way that grew shorter is
 # to be lowered.
 WAYS = [
@@ -40,6 +43,62 @@ def listed(design, section):
     return re.findall(r"^\| `([^`]+\.rs)` \|", text.group(1), re.M)
 
 
+def calls(profile, root):
+    """(file, file that it calls) -> calls, from a profile of callgrind; inlined instructions count as calls.
+
+    A closure is code of the file that made it, whoever calls it.
+    """
+    names, homes, edges = {}, {}, collections.Counter()
+
+    def name(table, text):
+        number, _, rest = text.partition(" ")
+        return names.setdefault((table, number), rest)
+
+    home = place = function = callee = None
+    is_call = False
+    for line in profile.splitlines():
+        kind, _, text = line.partition("=")
+        if kind == "fl":
+            home = place = name("file", text)
+        elif kind in ("fi", "fe"):
+            place = name("file", text)
+        elif kind == "fn":
+            function, place = name("function", text), home
+            homes[function] = home
+        elif kind in ("cfi", "cfl"):
+            name("file", text)
+        elif kind == "cfn":
+            callee = name("function", text)
+        elif kind == "calls":
+            edges[place, callee] += int(text.split()[0])
+            is_call = True
+        elif line[:1].isdigit() or line[:1] in ("+", "-", "*"):
+            # The line after a call has the cost of the callee.
+            if not is_call and place != home:
+                edges[home, place] += int(line.split()[1])
+            is_call = False
+    found = collections.Counter()
+    for (caller, callee), count in edges.items():
+        pair = [pathlib.Path(caller), pathlib.Path(homes.get(callee, callee))]
+        if not callee.endswith("{{closure}}") and all(path.is_relative_to(root) for path in pair):
+            found[tuple(str(path.relative_to(root)).removeprefix("src/") for path in pair)] += count
+    return found
+
+
+def upward(found, section, root):
+    """The calls, in each cycle, of a file that stands above in the list of a section."""
+    names = [PROGRAM, *listed((root / "DESIGN.md").read_text(), section)]
+    pairs = [pair for pair, count in found.items() if count >= CYCLES and pair[0] in names and pair[1] in names[1:]]
+    below = [pair for pair in pairs if names.index(pair[0]) < names.index(pair[1])]
+    above = [pair for pair in pairs if names.index(pair[0]) > names.index(pair[1])]
+    # Each file is called by one above it, or by the program.
+    lone = set(names[1:]) - {callee for _, callee in below}
+    print(f"{section}: {len(below)} pairs of files call downward, {len(above)} upward")
+    wrong = [f"{caller} calls {callee}, which stands above it" for caller, callee in sorted(above)]
+    wrong += [f"no file above {name} was seen to call it" for name in sorted(lone)]
+    return [f"'{section}': {line}" for line in wrong]
+
+
 def compare(files, section, most, root):
     """What is wrong with the list of a section."""
     way = {name for name in files if name.split("/")[0].removesuffix(".rs") not in VOCABULARY}
@@ -57,7 +116,7 @@ def compare(files, section, most, root):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--tests", action="store_true", help="prints the test of each way, and ends")
-    parser.add_argument("--reports", type=pathlib.Path, help="the folder with the report of each test")
+    parser.add_argument("--reports", type=pathlib.Path, help="the folder with the report and the calls of each test")
     parser.add_argument("--functions", action="store_true", help="lists the functions of each file")
     options = parser.parse_args()
     if options.tests:
@@ -67,6 +126,7 @@ def main():
     for test, section, most in WAYS:
         files = measured(json.loads((options.reports / test).read_text()), root)
         wrong += compare(files, section, most, root)
+        wrong += upward(calls((options.reports / f"{test}.calls").read_text(), root), section, root)
         if options.functions:
             for name, functions in sorted(files.items()):
                 print(name)
