@@ -9,8 +9,12 @@ use crate::time::{Duration, Edge, Instant};
 /// The checks of a motor without a configuration of its own.
 static USUAL: HealthConfig = HealthConfig::new();
 
-/// Period of the checks of slow quantities: temperature, effort, speed.
-const PERIOD: Duration = Duration::from_millis(8);
+/// Period of the checks of slow quantities in µs: temperature, effort, speed. A power of two.
+const PERIOD_US: u64 = 8_192;
+
+/// Parts of the period: motors whose ids differ in three bits are checked in different parts, so that eight motors of one bus do not
+/// make one tick in eight long.
+const PARTS: u64 = 8;
 
 /// Checks one motor outside the slots of a bus: counts its frames, and judges its vitals.
 #[derive(Debug, Clone, Copy)]
@@ -25,6 +29,8 @@ pub(crate) struct Watch {
     checked: Instant,
     /// Time of the next check of slow quantities.
     next: Instant,
+    /// The part of the period in which this motor is checked.
+    part: u8,
     /// Share of the output that the conditions leave.
     share: f32,
 }
@@ -41,6 +47,7 @@ impl Watch {
             error_code: 0,
             checked: Instant::START,
             next: Instant::START,
+            part: 0,
             share: 1.0,
         }
     }
@@ -93,7 +100,9 @@ impl Watch {
     }
 
     /// Begins anew before the motor is driven.
-    pub(crate) fn start(&mut self, guard: &mut Guard, now: Instant) {
+    pub(crate) fn start(&mut self, guard: &mut Guard, motor: MotorName, now: Instant) {
+        self.part = motor.id();
+        self.next = self.after(now);
         guard.latch(now, |latch| self.monitor.start(latch));
     }
 
@@ -107,7 +116,7 @@ impl Watch {
     ) -> f32 {
         if now < self.checked {
             // The clock went back.
-            (self.checked, self.next) = (now, now + PERIOD);
+            (self.checked, self.next) = (now, self.after(now));
         }
         let Vitals { has_fault, has_warning, .. } = vitals();
         let is_well = !(has_fault || has_warning || self.rival.is_present())
@@ -163,11 +172,11 @@ impl Watch {
     /// Returns the slow quantities, if their check is due.
     #[inline]
     fn begin_slow(&mut self, is_armed: bool, vitals: &Vitals, now: Instant) -> Option<Sample> {
-        let since = now.since(self.checked);
-        if since < PERIOD {
+        if now < self.next {
             return None;
         }
-        (self.checked, self.next) = (now, now + PERIOD);
+        let since = now.since(self.checked);
+        (self.checked, self.next) = (now, self.after(now));
         let saturated = is_armed && vitals.effort.abs() >= 1.0;
         self.saturated = self.saturated.saturating_add(u16::from(saturated));
         Some(Sample {
@@ -182,6 +191,13 @@ impl Watch {
             rest: 0,
             temperature: vitals.temperature_c.zip(self.config.temperatures_c()),
         })
+    }
+
+    /// Returns the next beginning of the part of this motor, at most a period after `now`.
+    fn after(&self, now: Instant) -> Instant {
+        let begins_us = (self.part as u64 % PARTS) * (PERIOD_US / PARTS);
+        let passed_us = now.as_micros().wrapping_sub(begins_us) % PERIOD_US;
+        now + Duration::from_micros(PERIOD_US - passed_us)
     }
 
     fn read_error(&mut self, latch: &mut Latch, vitals: &Vitals) {
@@ -337,5 +353,36 @@ mod tests {
         assert_eq!(of(Vitals::of_errors([0, 7, 9], 3)), (true, false, 7));
         assert_eq!(of(Vitals::of_errors([0, 0], 3)), (false, true, 3));
         assert_eq!(of(Vitals::of_errors([0, 0], 0)), (false, false, 0));
+    }
+
+    #[test]
+    fn eight_motors_of_a_bus_are_checked_in_eight_ticks_of_a_period() {
+        for from_us in [0, 1, 8_191, 8_192, 77_777_777, u64::MAX - 20_000] {
+            let now = Instant::from_micros(from_us);
+            let next = |part| Watch { part, ..Watch::new() }.after(now);
+            let mut times: [_; 8] = core::array::from_fn(|id| next(1 + id as u8));
+            times.sort();
+            assert!(times[0] > now && times[7].since(now).as_micros() <= PERIOD_US);
+            let apart = times.windows(2).map(|pair| pair[1].since(pair[0]).as_micros());
+            assert!(apart.into_iter().all(|micros| micros == 1_024), "{from_us}");
+            assert_eq!(next(3), next(11), "a ninth motor shares a tick");
+            assert_eq!(next(3).since(now).as_micros() % 1_024, (1_024 - from_us % 1_024) % 1_024);
+        }
+    }
+
+    #[test]
+    fn a_motor_is_checked_once_a_period_also_after_its_clock_went_back() {
+        let sample = |watch: &mut Watch, at_us| {
+            let now = Instant::from_micros(at_us);
+            watch.begin_slow(true, &Vitals::default(), now).is_some()
+        };
+        let mut watch = Watch::new();
+        let times = (1..=82).filter(|ms| sample(&mut watch, ms * 1_000)).count();
+        assert_eq!(times, 11, "in ten periods, and the first");
+        _ = watch.check(&mut Guard::new(), Vitals::default, Instant::from_micros(500));
+        assert_eq!(
+            (watch.checked, watch.next),
+            (Instant::from_micros(500), Instant::from_micros(8_192))
+        );
     }
 }

@@ -147,7 +147,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
         let missing = self.guard.is_missing(now).then_some(self.config.name);
         Obstacles::check_one(&mut self.guard, missing)?;
         if self.guard.engage(now) {
-            self.watch.start(&mut self.guard, now);
+            self.watch.start(&mut self.guard, self.config.name, now);
             self.rest();
         }
         Ok(())

@@ -127,7 +127,7 @@ impl<M: DriveProtocol> CanDevice for Actuator<M> {
     fn engage(&mut self, now: Instant) {
         let is_fit = !self.watch.is_faulty(&self.guard) && self.motor.wrong_setting().is_none();
         if is_fit && self.guard.engage(now) {
-            self.watch.start(&mut self.guard, now);
+            self.watch.start(&mut self.guard, self.motor.name(), now);
             self.relax();
         }
     }
