@@ -44,6 +44,7 @@ use crate::time::{Clock, Duration, Instant, Tick, Ticker};
 use embedded_can::ErrorKind;
 use port::{Received, Sending};
 use statistics::{Meter, Tally, increment};
+use stop::WatchedStop;
 use watch::{Pending, Watch, together};
 
 /// Number of frames for one reading of the clock: frames in the driver arrived before the reading, and frames arriving
@@ -94,7 +95,7 @@ pub struct Runner<P, K, D> {
     waiting: Option<Tick>,
     turn: u32,
     statistics: Statistics,
-    stop: Option<&'static EmergencyStop>,
+    stop: WatchedStop,
     watch: Watch,
     meter: Meter,
     pending: Pending,
@@ -112,7 +113,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
             waiting: None,
             turn: 0,
             statistics: Statistics::NONE,
-            stop: None,
+            stop: WatchedStop::NONE,
             watch: Watch::new(),
             meter: Meter::new(),
             pending: Pending::NONE,
@@ -301,7 +302,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     fn step(&mut self, tick: Tick, limit: impl FnOnce(&mut D), mut evicted: impl FnMut(&CanFrame)) {
         self.waiting = None;
         self.pending.hand_over(&mut evicted);
-        self.pending.was_stopped = self.stop.is_some_and(EmergencyStop::is_set);
+        self.pending.was_stopped = self.stop.take();
         if self.pending.was_stopped {
             self.device.emergency_stop();
         }
@@ -323,7 +324,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     fn send_waiting(&mut self) {
         let now = self.read_clock();
         let is_fresh = |ticked| ticked <= now && now.since(ticked) < self.ticker.period();
-        let is_stopped = self.stop.is_some_and(EmergencyStop::is_set) && !self.pending.was_stopped
+        let is_stopped = self.stop.is_set() && !self.pending.was_stopped
             || self.pending.was_armed && !self.device.is_armed();
         let has_place = self.pending.evicted.is_none();
         if has_place && self.watch.ticked().is_some_and(is_fresh) && !is_stopped {

@@ -2,12 +2,13 @@
 
 use super::port::{Driver, Nb, Port, Received, Sent};
 use crate::frame::CanFrame;
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 /// An emergency stop that any context can set: put it into a `static` and set it from an interrupt.
 ///
 /// The runner reads the stop in each tick; from that tick on every command is zero, until
-/// [`Runner::clear_emergency_stop`](super::Runner::clear_emergency_stop) and arming again.
+/// [`Runner::clear_emergency_stop`](super::Runner::clear_emergency_stop) and arming again. A stop set and cleared between two
+/// ticks counts, and each runner with the stop needs a clear of its own.
 ///
 /// # Examples
 /// ```
@@ -18,29 +19,74 @@ use core::sync::atomic::{AtomicBool, Ordering};
 /// assert!(STOP.is_set());
 /// ```
 #[derive(Debug, Default)]
-pub struct EmergencyStop(AtomicBool);
+pub struct EmergencyStop {
+    is_set: AtomicBool,
+    /// The calls of `set`: a runner notices a stop that was cleared since.
+    sets: AtomicU32,
+}
 
 impl EmergencyStop {
     /// Makes an emergency stop that is not set.
     #[must_use]
     pub const fn new() -> Self {
-        Self(AtomicBool::new(false))
+        Self { is_set: AtomicBool::new(false), sets: AtomicU32::new(0) }
     }
 
     /// Stops.
     pub fn set(&self) {
-        self.0.store(true, Ordering::Release);
+        // No core without a compare-and-swap has an atomic addition. Two calls at once may count as one.
+        self.sets.store(self.sets.load(Ordering::Acquire).wrapping_add(1), Ordering::Release);
+        self.is_set.store(true, Ordering::Release);
     }
 
     /// Clears the stop; stopped motors stay stopped until [`Runner::clear_emergency_stop`](super::Runner::clear_emergency_stop).
     pub fn clear(&self) {
-        self.0.store(false, Ordering::Release);
+        self.is_set.store(false, Ordering::Release);
     }
 
     /// Returns whether the stop is set.
     #[must_use]
     pub fn is_set(&self) -> bool {
-        self.0.load(Ordering::Acquire)
+        self.is_set.load(Ordering::Acquire)
+    }
+
+    fn sets(&self) -> u32 {
+        self.sets.load(Ordering::Acquire)
+    }
+}
+
+/// The stop of a runner, with the number of its sets until the last tick.
+#[derive(Debug)]
+pub(super) struct WatchedStop {
+    stop: Option<&'static EmergencyStop>,
+    seen: u32,
+}
+
+impl WatchedStop {
+    pub(super) const NONE: Self = Self { stop: None, seen: 0 };
+
+    pub(super) fn new(stop: &'static EmergencyStop) -> Self {
+        Self { stop: Some(stop), seen: stop.sets() }
+    }
+
+    /// Tells whether the stop is set, or was since the last tick.
+    pub(super) fn is_set(&self) -> bool {
+        self.stop.is_some_and(|stop| stop.is_set() || stop.sets() != self.seen)
+    }
+
+    /// Tells a tick whether the stop is set, or was since the tick before.
+    pub(super) fn take(&mut self) -> bool {
+        let is_set = self.is_set();
+        if let (true, Some(stop)) = (is_set, self.stop) {
+            self.seen = stop.sets();
+        }
+        is_set
+    }
+
+    pub(super) fn clear(&self) {
+        if let Some(stop) = self.stop {
+            stop.clear();
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! The methods of a runner beside its cycle: settings, arming, frames of a queue, counters and conditions.
 
-use super::{BusCondition, EmergencyStop, Port, Runner, Statistics};
+use super::{BusCondition, EmergencyStop, Port, Runner, Statistics, WatchedStop};
 #[cfg(feature = "queue")]
 use super::{FrameReceiver, statistics::Tally};
 use crate::motor::{ArmError, BusLoad, Devices, ask};
@@ -62,7 +62,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// Watches an emergency stop.
     #[must_use]
     pub fn with_emergency_stop(mut self, stop: &'static EmergencyStop) -> Self {
-        self.stop = Some(stop);
+        self.stop = WatchedStop::new(stop);
         self
     }
 
@@ -72,7 +72,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// Names the reason, as [`Devices::arm`]; also a watched emergency stop, and a driver that takes no frames. If motors are
     /// missing on a full bus, the error has the [measured load](Self::measured_load). A refused call counts as a request.
     pub fn arm(&mut self, tick: Tick) -> Result<(), ArmError> {
-        let is_stopped = self.stop.is_some_and(EmergencyStop::is_set);
+        let is_stopped = self.stop.is_set();
         let Some(refusal) = ArmError::around(is_stopped, self.is_bus_down()) else {
             let outcome = self.device.arm(tick.now());
             return outcome.map_err(|refusal| refusal.on_bus(self.meter.last()));
@@ -88,11 +88,10 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         self.device.is_armed()
     }
 
-    /// Clears the watched emergency stop and the stop of the device. The device stays disarmed.
+    /// Clears the watched emergency stop and the stop of the device. The device stays disarmed. A stop set since the last tick
+    /// acts in the next tick all the same.
     pub fn clear_emergency_stop(&mut self) {
-        if let Some(stop) = self.stop {
-            stop.clear();
-        }
+        self.stop.clear();
         self.device.clear_emergency_stop();
     }
 
