@@ -2,8 +2,9 @@ use super::kinematics::{Fastest, slowed};
 use super::{ChassisLimits, ChassisStatus, DeadClock, Kinematics, Odometry, WheelSpeed};
 use crate::error::ConfigError;
 use crate::geometry::{Body, Heading, Pose2, Twist, World};
+use crate::math;
 use crate::motor::TargetError;
-use crate::time::Tick;
+use crate::time::{Duration, Instant, Tick};
 use crate::units::Angle;
 
 /// A chassis of any layout: commands in, wheel speeds out, pose kept.
@@ -18,7 +19,8 @@ use crate::units::Angle;
 ///    see [`Swerve::steer`](super::Swerve::steer).
 ///
 /// A command that is NaN or infinite, or faster than 1e19 m/s, stops the chassis and is counted. A command not renewed
-/// for 0.1 s counts as zero. A `dt` that is zero, negative, NaN or infinite moves neither pose nor command; a `dt` over
+/// for 0.1 s counts as zero; so does, in the first tick after a pause of as long, the command of before the tick. A heading that
+/// jumps by more than 0.2 rad against the wheels turns the pose, and not the motion of the wheels. A `dt` that is zero, negative, NaN or infinite moves neither pose nor command; a `dt` over
 /// 0.1 s counts as 0.1 s for the acceleration, and a `dt` over 1 s moves no pose. In the 100th tick in a row without
 /// usable time the clock is dead: the command counts as stale, and since no ramp can be timed, the wheels stop at once.
 ///
@@ -43,6 +45,7 @@ pub struct Chassis<K: Kinematics> {
     command: Command,
     command_age_s: f32,
     is_renewed: bool,
+    updated: Option<Instant>,
     clock: DeadClock,
     gyro: Option<Heading>,
     reference: Twist<World>,
@@ -63,6 +66,9 @@ impl<K: Kinematics> Chassis<K> {
     /// The longest step in seconds that counts in full for the acceleration limit.
     pub const MAX_STEP_S: f32 = 0.1;
 
+    /// No chassis turns so far within a tick against its wheels: 11°.
+    const JUMP_RAD: f32 = 0.2;
+
     /// Takes the layout. Nothing is limited; commands must be renewed every 0.1 s.
     #[must_use]
     pub const fn new(kinematics: K) -> Self {
@@ -73,6 +79,7 @@ impl<K: Kinematics> Chassis<K> {
             command: Command::Body(Twist::ZERO),
             command_age_s: f32::MAX,
             is_renewed: false,
+            updated: None,
             clock: DeadClock::new(),
             gyro: None,
             reference: Twist::ZERO,
@@ -176,7 +183,8 @@ impl<K: Kinematics> Chassis<K> {
         let dt_s = self.clock.take_step(tick.dt_s());
         self.measure(measured, dt_s);
         let heading = self.odometry.heading();
-        let target = self.target(dt_s).to_world(heading);
+        let missed_s = self.passed(tick.now()).as_secs_f32() - dt_s;
+        let target = self.target(dt_s, missed_s).to_world(heading);
         let step_s = if dt_s > Self::MAX_STEP_S { Self::MAX_STEP_S } else { dt_s };
         self.reference = if self.clock.is_dead() {
             Twist::ZERO
@@ -230,20 +238,33 @@ impl<K: Kinematics> Chassis<K> {
         if motion.is_none() || !counted {
             self.status.blind_s = (self.status.blind_s + dt_s).min(f32::MAX);
         }
-        if self.odometry.has_gyro() && !had_gyro {
-            // The heading jumps from the wheels' to the gyroscope's; the robot does not.
-            let turned = before.angle().as_radians() + self.measured.wz_rad_s * dt_s;
-            let expected = Heading::new(Angle::from_radians(turned));
-            self.reference = self.reference.to_body(expected).to_world(self.odometry.heading());
+        let turned = if counted { self.measured.wz_rad_s * dt_s } else { 0.0 };
+        let heading = self.odometry.heading();
+        let expected = Heading::new(before.angle() + Angle::from_radians(turned));
+        let error = math::wrap_pi((heading.angle() - expected.angle()).as_radians());
+        if self.odometry.has_gyro() && (!had_gyro || error.abs() > Self::JUMP_RAD) {
+            // The heading jumps; the robot does not.
+            self.reference = self.reference.to_body(expected).to_world(heading);
         }
     }
 
-    fn target(&mut self, dt_s: f32) -> Twist<Body> {
+    /// Returns the time since the update before.
+    fn passed(&mut self, now: Instant) -> Duration {
+        let before = self.updated.replace(now);
+        before.map_or(Duration::ZERO, |before| now.since(before))
+    }
+
+    fn target(&mut self, dt_s: f32, missed_s: f32) -> Twist<Body> {
+        let timeout_s = self.limits.command_timeout_s();
+        // Updates were left out for so long, and nobody knows when the command came.
+        let is_paused = missed_s > timeout_s;
+        let is_new = core::mem::take(&mut self.is_renewed) && !is_paused;
         // The step came before a new command, and after an old command.
-        self.command_age_s = if self.is_renewed { 0.0 } else { self.command_age_s + dt_s };
-        self.is_renewed = false;
-        self.status.command_stale =
-            self.clock.is_dead() || self.command_age_s > self.limits.command_timeout_s();
+        self.command_age_s = if is_new { 0.0 } else { self.command_age_s + dt_s };
+        if is_paused {
+            self.command_age_s = f32::MAX;
+        }
+        self.status.command_stale = self.clock.is_dead() || self.command_age_s > timeout_s;
         match self.command {
             _ if self.status.command_stale => Twist::ZERO,
             Command::Lock => Twist::ZERO,
@@ -688,6 +709,67 @@ mod tests {
     }
 
     #[test]
+    fn a_command_of_before_a_pause_does_not_drive_and_the_next_one_does() {
+        let at_ms = |ms: u64| Tick::new(Instant::from_micros(1_000 * ms), 0.001);
+        let mut chassis = Chassis::new(mecanum());
+        let mut drive = |is_renewed, ms| {
+            if is_renewed {
+                chassis.set_body(Twist::new(1.0, 0.0, 0.0));
+            }
+            chassis.update(NONE, at_ms(ms));
+            (chassis.reference().vx_m_s, chassis.status().command_stale)
+        };
+        assert_eq!(drive(true, 5_000), (1.0, false));
+        // A program that drives while armed alone: these are the next updates.
+        assert_eq!(drive(false, 11_000), (0.0, true));
+        assert_eq!(drive(true, 17_000), (0.0, true), "of any time of the pause");
+        assert_eq!(drive(true, 17_001), (1.0, false));
+        assert_eq!(drive(false, 17_100), (1.0, false), "a pause of 0.1 s");
+        assert_eq!(drive(true, 3), (1.0, false), "the clock went back");
+        for ms in [403, 803, 1_203] {
+            chassis.set_body(Twist::new(1.0, 0.0, 0.0));
+            chassis.update(NONE, Tick::new(Instant::from_micros(1_000 * ms), 0.4));
+            assert!(!chassis.status().command_stale, "steps of a slow program");
+        }
+    }
+
+    #[test]
+    fn a_heading_that_jumps_turns_the_pose_and_not_the_wheels() {
+        let limits = ChassisLimits::new().with_acceleration(3.0, 30.0);
+        // An IMU that starts again, and one that is wrong once.
+        for (first, from, then) in [(120.0, 1_001, 0.0), (0.0, 1_000, 180.0), (0.0, 1_000, -12.0)] {
+            let (mut chassis, mut last) = (limited(limits), Twist::ZERO);
+            let mut wheels = MecanumWheels::splat(Some(AngularVelocity::ZERO));
+            for ms in 0..2_000 {
+                let jumps = if from == 1_001 { ms >= from } else { ms == from };
+                chassis.set_heading(facing(if jumps { then } else { first }));
+                chassis.set_body(Twist::new(1.5, 0.0, 0.0));
+                wheels = chassis.update(wheels, TICK).map(Some);
+                let step = (chassis.reference() - last).linear().norm();
+                assert!(step <= 0.003_01, "{step} m/s in tick {ms} from {first} to {then}");
+                last = chassis.reference();
+            }
+            assert!((last.vx_m_s - 1.5).abs() < 1e-3, "{last:?}");
+        }
+    }
+
+    #[test]
+    fn a_chassis_that_is_turned_against_its_wheels_keeps_its_motion_in_the_world() {
+        let mut chassis = limited(ChassisLimits::new().with_acceleration(1.0, 1.0));
+        let rolls = mecanum().inverse(Twist::new(1.0, 0.0, 0.0)).map(Some);
+        for ms in 0..3_000_u16 {
+            // Hit after 2 s: 10 rad/s for 0.1 s, which no wheel shows.
+            let turned = 0.01 * f32::from(ms.saturating_sub(2_000).min(100));
+            chassis.set_heading(Heading::new(Angle::from_radians(turned)));
+            chassis.set_world(Twist::new(1.0, 0.0, 0.0), Heading::new(Angle::from_radians(turned)));
+            chassis.update(rolls, TICK);
+        }
+        let body = chassis.reference();
+        assert!((body.vx_m_s - 1.0_f32.cos()).abs() < 1e-3, "{body:?}");
+        assert!((body.vy_m_s + 1.0_f32.sin()).abs() < 1e-3, "{body:?}");
+    }
+
+    #[test]
     fn a_pose_of_nan_is_counted_and_changes_nothing() {
         let mut chassis = Chassis::new(mecanum());
         let pose = Pose2::new(1.0, 2.0, Angle::from_degrees(30.0));
@@ -760,7 +842,7 @@ mod tests {
         chassis.update(NONE, TICK);
         chassis.lock();
         assert_eq!(chassis.update(NONE, TICK), MecanumWheels::splat(AngularVelocity::ZERO));
-        assert_eq!(size_of::<Chassis<Mecanum>>(), 168); // steering costs them nothing
+        assert_eq!(size_of::<Chassis<Mecanum>>(), 184); // steering costs them nothing
     }
 
     const CORNERS: [Vec2; 4] =
