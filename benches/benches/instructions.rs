@@ -43,7 +43,7 @@ fn at_most(instructions: u64) -> LibraryBenchmarkConfig {
 #[library_benchmark]
 #[bench::speed(args = (Targets::Speed), setup = robot, config = at_most(2_125_000))]
 #[bench::cascade(args = (Targets::Position), setup = robot, config = at_most(3_261_000))]
-#[bench::disarmed(args = (Targets::Disarmed), setup = robot, config = at_most(1_735_000))]
+#[bench::disarmed(args = (Targets::Disarmed), setup = robot, config = at_most(1_755_000))]
 fn cycle(mut robot: Box<Robot>) -> Box<Robot> {
     (0..CYCLES).for_each(|_| robot.cycle());
     robot
@@ -59,7 +59,7 @@ fn program(mut robot: Box<Robot>) -> Box<Robot> {
 }
 
 #[library_benchmark]
-#[bench::foreign(args = (Targets::Speed), setup = others, config = at_most(799_000))]
+#[bench::foreign(args = (Targets::Speed), setup = others, config = at_most(803_000))]
 fn poll(mut robot: Box<Robot>) -> Box<Robot> {
     (0..CYCLES).for_each(|_| robot.poll());
     robot
