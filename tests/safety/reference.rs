@@ -80,6 +80,8 @@ pub(super) struct Reference {
     rested: u64,
     /// The last update was seen to give none.
     is_resting: bool,
+    /// The motor was driven since it was armed.
+    was_driven: bool,
     bounds: Bounds,
     is_in_doubt: bool,
     is_target_ahead: bool,
@@ -118,6 +120,7 @@ impl Reference {
             commanded: 0,
             rested: 0,
             is_resting: true,
+            was_driven: false,
             bounds: Bounds { least: 0.0, most: 0.0 },
             is_in_doubt: false,
             is_target_ahead: false,

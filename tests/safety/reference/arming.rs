@@ -43,7 +43,7 @@ impl Reference {
             self.relax();
             self.arming = Arming::Armed;
             self.has_rested = true;
-            self.is_resting = true;
+            (self.is_resting, self.was_driven) = (true, false);
             self.open(now);
         }
         self.armed_at = self.armed_at.max(now);

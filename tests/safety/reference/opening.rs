@@ -95,23 +95,27 @@ impl Reference {
         Bounds { least: if self.is_resting { 0.0 } else { least }, most }
     }
 
-    /// Takes the output of an update. A drive at rest that might be driven was not enabled yet: its output opens anew.
+    /// Takes the output of an update; returns whether the motor is driven again after a rest, without another arming. A drive at rest
+    /// that might be driven was not enabled yet: its output opens anew.
     pub(crate) fn note(
         &mut self,
         now: u64,
         output: f64,
         predicted: Option<Bounds>,
         has_step: bool,
-    ) {
-        self.is_resting = output == 0.0;
+    ) -> bool {
+        let was_resting = core::mem::replace(&mut self.is_resting, output == 0.0);
+        let is_again = self.was_driven && was_resting && !self.is_resting;
+        self.was_driven |= !self.is_resting;
         if !self.rules.is_prepared || !self.is_resting {
-            return;
+            return is_again;
         }
         self.rested = now;
         let was_asked = predicted.is_some_and(|bounds| bounds.most > 2.0 * self.rules.resolution);
         if was_asked && has_step {
             self.opening.begin(now);
         }
+        is_again
     }
 
     /// Takes an update without a command: a question took its place. The drive goes on as before.
