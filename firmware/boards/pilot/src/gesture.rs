@@ -1,4 +1,4 @@
-//! Who may arm, and when: by a turn of the remote control's right switch.
+//! Who may arm, and when: by a turn of the remote control's right switch, while nothing else asks for a motion.
 
 use drivetrain::wire::dbus::{Remote, Switch};
 
@@ -23,10 +23,15 @@ impl Gesture {
         match (core::mem::replace(&mut self.0, remote.right_switch), remote.right_switch) {
             (Switch::Up, Switch::Up) => Wish::GoOn,
             // The turn of the switch, not its place: a remote that comes back in range must not start a robot.
-            (Switch::Middle | Switch::Down, Switch::Up) if at_rest(remote) => Wish::Arm,
+            (Switch::Middle | Switch::Down, Switch::Up) if asks_for_nothing(remote) => Wish::Arm,
             _ => Wish::Rest,
         }
     }
+}
+
+/// Tells whether both sticks are let go, and the left switch is in its middle: elsewhere it shoots, or spins a chassis.
+fn asks_for_nothing(remote: &Remote) -> bool {
+    at_rest(remote) && remote.left_switch == Switch::Middle
 }
 
 /// Tells whether both sticks are let go.

@@ -8,8 +8,9 @@
 //! | shooter | two M3508 without gearbox, ids 1 and 2: friction wheels | second |
 //! | | M2006, id 3: loader | second |
 //!
-//! The right switch arms at the top, and rests elsewhere. The right stick moves the robot to where the gimbal looks, the left
-//! one turns the gimbal. The left switch shoots at the top, and spins the chassis at the bottom.
+//! The right switch arms when it is turned to the top while both sticks are at rest and the left switch is in its middle; elsewhere
+//! the robot rests. The right stick moves the robot to where the gimbal looks, the left one turns the gimbal. The left switch shoots
+//! at the top, and spins the chassis at the bottom.
 
 use crate::gesture::{Gesture, Wish};
 use crate::loader::Loader;
@@ -276,6 +277,23 @@ mod tests {
     const TRIGGER_MS: u64 = 50;
     const JAM_MS: u64 = 800;
     const END_MS: u64 = 2_800;
+
+    #[test]
+    fn a_sentry_whose_left_switch_would_shoot_or_spin_is_not_armed() {
+        use Switch::{Absent, Down, Middle, Up};
+        let remote =
+            |right_switch, left_switch| Remote { right_switch, left_switch, ..Remote::default() };
+        let wish = |left| {
+            let (mut sentry, ..) = Sentry::new().unwrap();
+            sentry.wish(&remote(Middle, left));
+            let turned = sentry.wish(&remote(Up, left));
+            // Let go later, it does not arm: the right switch has to be turned anew.
+            assert_ne!(sentry.wish(&remote(Up, Middle)), Wish::Arm);
+            turned
+        };
+        let wishes = [Up, Down, Absent, Middle].map(wish);
+        assert_eq!(wishes, [Wish::Rest, Wish::Rest, Wish::Rest, Wish::Arm]);
+    }
 
     #[test]
     fn a_loader_that_stays_blocked_turns_back_twice_and_then_takes_no_current() {
