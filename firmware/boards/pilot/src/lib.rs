@@ -5,7 +5,8 @@
 //! the remote.
 //! The right stick moves the chassis, the left one turns it. With an IMU that is heard, forward is where its yaw is zero;
 //! without one, forward is where the chassis looks. Which of them holds is chosen while both sticks are at rest; when the IMU
-//! falls silent while one is held, the robot stops until both are let go.
+//! falls silent while one is held, the robot stops until both are let go. When a wheel is lost for 100 ms, the others brake until the
+//! robot is armed again.
 //!
 //! A PC may set the gains of the wheels while the robot runs, and a turn that adds to the stick's for 500 ms: lines such as
 //! `wheel_kp=2.5` and `turn=0.5` on a serial port, see [`Pilot::hear_debug_port`]. No line arms the robot. Curves for VOFA+ go back:
@@ -23,6 +24,7 @@ use drivetrain::chassis::{Chassis, ChassisLimits, Mecanum, MecanumWheels};
 use drivetrain::control::{PidConfig, WheelTuning};
 use drivetrain::dji::{Bus, Config, Handle, M3508, Model};
 use drivetrain::geometry::{Heading, Twist, Vec2};
+use drivetrain::motor::Devices;
 use drivetrain::time::{Duration, Edge, Instant, Tick};
 use drivetrain::units::{AngularVelocity, Current};
 use drivetrain::wire::dbus::{Dbus, Remote};
@@ -167,9 +169,12 @@ impl Pilot {
         wish
     }
 
-    /// Sets the targets of the wheels.
+    /// Sets the targets of the wheels: zero unless all are armed, so when one is lost for 100 ms, the others brake.
     pub fn drive(&mut self, bus: &mut Bus, tick: Tick) {
         self.steer(&self.dbus.remote(tick.now()), tick.now());
+        if !bus.is_armed() {
+            self.chassis.set_body(Twist::ZERO);
+        }
         self.chassis.drive(bus, self.wheels, tick);
     }
 
@@ -224,10 +229,23 @@ fn chassis_of() -> Result<Chassis<Mecanum>, &'static str> {
 mod tests {
     use super::*;
     use drivetrain::frame::CanFrame;
+    use drivetrain::geometry::Body;
+    use drivetrain::runner::{Nb, Runner};
+    use drivetrain::sim::{ChassisConfig, Fault, MotorConfig, Simulation, Wheel};
+
+    const UP: u64 = 1;
+    const MIDDLE: u64 = 3;
+    const REST: u64 = 1024;
+    const HALF: u64 = 1354;
 
     /// A frame with all channels at rest but the first, and the right switch at `switch`.
     fn frame(channel: u64, switch: u64) -> [u8; 18] {
-        let bits = channel | 1024 << 11 | 1024 << 22 | 1024 << 33 | switch << 44 | 3 << 46;
+        shown(channel, REST, switch)
+    }
+
+    /// The right stick across and ahead, and the right switch.
+    fn shown(across: u64, ahead: u64, switch: u64) -> [u8; 18] {
+        let bits = across | ahead << 11 | REST << 22 | REST << 33 | switch << 44 | MIDDLE << 46;
         let mut frame = [0; 18];
         frame[..6].copy_from_slice(&bits.to_le_bytes()[..6]);
         frame
@@ -260,8 +278,6 @@ mod tests {
 
     #[test]
     fn only_turning_the_switch_to_the_top_with_both_sticks_at_rest_arms() {
-        const UP: u64 = 1;
-        const MIDDLE: u64 = 3;
         assert_eq!(wishes(&[frame(1024, MIDDLE), frame(1024, UP)]), Wish::Arm);
         assert_eq!(wishes(&[frame(1024, MIDDLE), frame(1024, UP), frame(1684, UP)]), Wish::GoOn);
         assert_eq!(wishes(&[frame(1024, MIDDLE), frame(1684, UP)]), Wish::Rest);
@@ -334,6 +350,55 @@ mod tests {
         assert_eq!(frame[20..], [0, 0, 0x80, 0x7F]);
     }
 
+    /// The motion of the robot at half a stick ahead, and 0.6 s after its front left wheel fell silent.
+    fn motions_with_a_wheel_that_falls_silent() -> [Twist<Body>; 2] {
+        const SILENT_AT_MS: u64 = 2_000;
+        let world = Simulation::new(1);
+        let wheel = |id, x, y| {
+            let motor = world.attach(MotorConfig::m3508(id)).unwrap();
+            (motor, Wheel::mecanum(motor, WHEEL.wheel_radius_m, Vec2::new(x, y)))
+        };
+        let left = [wheel(2, 0.2, 0.18), wheel(3, -0.2, 0.18)];
+        let right =
+            [wheel(1, 0.2, -0.18), wheel(4, -0.2, -0.18)].map(|(_, wheel)| wheel.reversed());
+        let floor = [left[0].1, left[1].1, right[0], right[1]];
+        world.attach_chassis(ChassisConfig::new(&floor).with_mass_kg(WHEEL.mass_kg)).unwrap();
+        let at = |ms| Instant::START + Duration::from_millis(ms);
+        world.fault(Fault::Silent(left[0].0), at(SILENT_AT_MS)..at(9_000)).unwrap();
+        let mut bus = Bus::new();
+        let mut pilot = Pilot::new(&mut bus).unwrap();
+        let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
+        let mut motions = [Twist::ZERO; 2];
+        for ms in 1..SILENT_AT_MS + 600 {
+            world.advance(Duration::from_millis(1));
+            runner.poll(16);
+            let Some(tick) = runner.due() else { continue };
+            let (ahead, switch) = match ms {
+                0..200 => (REST, MIDDLE),
+                200..500 => (REST, UP),
+                _ => (HALF, UP),
+            };
+            pilot.hear_remote(&shown(REST, ahead, switch), tick.now());
+            match pilot.wish(tick.now()) {
+                Wish::Arm => runner.arm(tick).unwrap(),
+                Wish::GoOn => {}
+                Wish::Rest => runner.device_mut().disarm(),
+            }
+            pilot.drive(runner.device_mut(), tick);
+            runner.tick(tick);
+            let (_, motion) = world.chassis().unwrap();
+            motions = [if ms < SILENT_AT_MS { motion } else { motions[0] }, motion];
+        }
+        motions
+    }
+
+    #[test]
+    fn three_wheels_stop_the_robot_when_the_fourth_is_lost_while_a_stick_is_held() {
+        let [before, after] = motions_with_a_wheel_that_falls_silent();
+        assert!((before.vx_m_s - 0.75).abs() < 0.05, "{before:?}");
+        assert!(after.linear().norm() < 0.02 && after.wz_rad_s.abs() < 0.02, "{after:?}");
+    }
+
     /// A frame of the IMU at a yaw of 180°; its time goes on, otherwise it would count as frozen.
     fn turned_around(now: Instant) -> [u8; 82] {
         let mut frame = [0; 82];
@@ -356,7 +421,6 @@ mod tests {
     #[test]
     fn a_stick_that_is_held_never_turns_the_way_around_when_the_imu_comes_and_goes() {
         const RIGHT: u64 = 1684;
-        const REST: u64 = 1024;
         const UNHEARD: MecanumWheels<Option<AngularVelocity>> = MecanumWheels {
             front_left: None,
             front_right: None,
