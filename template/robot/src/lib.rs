@@ -5,6 +5,7 @@ use drivetrain::chassis::{Chassis, ChassisLimits, Differential};
 use drivetrain::control::{PidConfig, WheelTuning};
 use drivetrain::dji::{Bus, Config, Handle, M3508, Model};
 use drivetrain::geometry::Twist;
+use drivetrain::motor::Devices;
 use drivetrain::time::Tick;
 use drivetrain::units::{AngularVelocity, Current};
 use drivetrain::wire::dbus::{Remote, Switch};
@@ -121,9 +122,10 @@ impl Robot {
         }
     }
 
-    /// Sets the targets of the wheels.
+    /// Sets the targets of the wheels: zero unless both are armed, so when one is lost for 100 ms, the other brakes.
     pub fn drive(&mut self, bus: &mut Bus, remote: &Remote, tick: Tick) {
-        let (ahead, left) = self.mode.fastest();
+        let mode = if bus.is_armed() { self.mode } else { Mode::Rest };
+        let (ahead, left) = mode.fastest();
         self.chassis.set_body(Twist::new(remote.right_y * ahead, 0.0, -remote.left_x * left));
         self.chassis.drive(bus, self.wheels, tick);
     }
