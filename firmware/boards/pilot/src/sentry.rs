@@ -10,7 +10,7 @@
 //!
 //! The right switch arms when it is turned to the top while both sticks are at rest and the left switch is in its middle; elsewhere
 //! the robot rests. The right stick moves the robot to where the gimbal looks, the left one turns the gimbal. The left switch shoots
-//! at the top, and spins the chassis at the bottom.
+//! at the top, and spins the chassis at the bottom. Arming holds the gimbal where it looks.
 
 use crate::gesture::{Gesture, Wish};
 use crate::loader::Loader;
@@ -144,8 +144,9 @@ impl Aiming {
             .filter(|_| is_armed)
             .unwrap_or((seen.yaw.angle.as_radians(), seen.pitch.angle.as_radians()));
         let yaw = yaw - remote.left_x * FASTEST_RAD_S * dt_s;
-        let pitch = (pitch - remote.left_y * FASTEST_RAD_S * dt_s)
-            .clamp(-FURTHEST_PITCH_RAD, FURTHEST_PITCH_RAD);
+        // A gimbal hangs without torque: beyond its limit it is held, and the stick leads it inward only.
+        let (low, high) = (pitch.min(-FURTHEST_PITCH_RAD), pitch.max(FURTHEST_PITCH_RAD));
+        let pitch = (pitch - remote.left_y * FASTEST_RAD_S * dt_s).clamp(low, high);
         self.held = Some((yaw, pitch));
         Aim { yaw: Angle::from_radians(yaw), pitch: Angle::from_radians(pitch), seen }
     }
@@ -293,6 +294,42 @@ mod tests {
         };
         let wishes = [Up, Down, Absent, Middle].map(wish);
         assert_eq!(wishes, [Wish::Rest, Wish::Rest, Wish::Rest, Wish::Arm]);
+    }
+
+    /// The targets of the pitch, of so many seconds each in which the left stick is there; armed where the gimbal looks.
+    fn pitches(looks_at: f32, sticks: &[(f32, f32)]) -> Vec<f32> {
+        let measured = |radians| Measured {
+            angle: Angle::from_radians(radians),
+            velocity: AngularVelocity::ZERO,
+            at: Instant::START,
+        };
+        let seen = Attitude { yaw: measured(0.0), pitch: measured(looks_at) };
+        let mut aiming = Aiming::default();
+        aiming.update(&Remote::default(), seen, false, 0.001);
+        let pitch_after = |(left_y, seconds): &(f32, f32)| {
+            let remote = Remote { left_y: *left_y, ..Remote::default() };
+            let mut pitch = f32::NAN;
+            for _ in 0..(seconds * 1_000.0) as u32 {
+                pitch = aiming.update(&remote, seen, true, 0.001).pitch.as_radians();
+            }
+            (pitch * 100.0).round() / 100.0
+        };
+        sticks.iter().map(pitch_after).collect()
+    }
+
+    #[test]
+    fn arming_holds_a_gimbal_that_hangs_beyond_its_limit_where_it_looks() {
+        for looks_at in [-1.2, -0.4, 0.1, 0.8] {
+            assert_eq!(pitches(looks_at, &[(0.0, 0.01), (0.0, 1.0)]), [looks_at; 2]);
+        }
+    }
+
+    #[test]
+    fn a_gimbal_beyond_its_limit_follows_the_stick_inward_and_stays_inside() {
+        // 3 rad/s; the muzzle goes down when the stick is pulled.
+        assert_eq!(pitches(0.8, &[(-1.0, 0.5), (1.0, 0.1), (-1.0, 0.5)]), [0.8, 0.5, 0.5]);
+        assert_eq!(pitches(0.8, &[(1.0, 0.2), (-1.0, 0.5), (1.0, 1.0)]), [0.2, 0.4, -0.4]);
+        assert_eq!(pitches(-0.8, &[(1.0, 0.5), (-1.0, 0.2), (1.0, 0.5)]), [-0.8, -0.2, -0.4]);
     }
 
     #[test]
