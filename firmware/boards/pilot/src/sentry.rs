@@ -10,7 +10,8 @@
 //!
 //! The right switch arms when it is turned to the top while both sticks are at rest and the left switch is in its middle; elsewhere
 //! the robot rests. The right stick moves the robot to where the gimbal looks, the left one turns the gimbal. The left switch shoots
-//! at the top, and spins the chassis at the bottom. Arming holds the gimbal where it looks.
+//! at the top, and spins the chassis at the bottom. Arming holds the gimbal where it looks, and the chassis turns to there with both
+//! sticks at rest too.
 
 use crate::gesture::{Gesture, Wish};
 use crate::loader::Loader;
