@@ -1,6 +1,6 @@
 """What goes wrong with a motor or its ESC."""
 from robots import CYCLE_US, FAULT_AT_US
-from rows.judge import LOST_US, drives_again, driving, first_word, goes_on, must, rested, rests, row
+from rows.judge import LOST_US, STANDS_RPM, drives_again, driving, first_word, goes_on, must, rested, rests, row
 
 # A fault that an ESC reports shows in its next frame, in the next tick.
 REPORTED_US = 3 * CYCLE_US + 300
@@ -20,6 +20,18 @@ def silent_motor(robot):
     must(zero < LOST_US, f"its word is zero after {zero:.0f} us only")
     drives_again(robot, FAULT_AT_US + 140_000)
     return {"zero_us": zero, "stale": len(robot.stale()), "note": "rests when heard again; drives again when armed again"}
+
+
+@row("F24", needs="remote")
+def lost_wheel(robot):
+    """The first motor is silent for good while a stick is held: the other wheels brake."""
+    driving(robot)
+    robot.world.fault("silent", 0, FAULT_AT_US, FAULT_AT_US + 600_000)
+    robot.run(FAULT_AT_US + 500_000)
+    zero = first_word(robot, FAULT_AT_US, LOST_US)
+    turning = [abs(robot.world.state(motor)[0]) for motor in range(1, 4)]
+    must(max(turning) < STANDS_RPM, f"the other wheels turn with {turning} rpm 500 ms after the motor was lost")
+    return {"zero_us": zero, "stale": len(robot.stale(FAULT_AT_US)), "note": "the other wheels brake"}
 
 
 @row("F15")

@@ -3,10 +3,10 @@ import random
 
 from board.imu import frame
 from robots import ARM_AT_US, CYCLE_US, FAULT_AT_US
-from rows.judge import REMOTE_LOST_US, drives_again, driving, goes_on, must, rested, rests, row
+from rows.judge import REMOTE_LOST_US, STANDS_RPM, drives_again, driving, goes_on, must, rested, rests, row
 
-# A wheel that is slower stands. A chassis of 20 kg brakes from half its speed within 300 ms, and an IMU is lost after 50 ms.
-STANDS_RPM, STOP_US, LOOK_US = 5, 350_000, 5_000
+# A chassis of 20 kg brakes from half its speed within 300 ms, and an IMU is lost after 50 ms.
+STOP_US, LOOK_US = 350_000, 5_000
 
 
 @row("F41")

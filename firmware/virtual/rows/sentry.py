@@ -1,5 +1,5 @@
 """The sentry: two buses, a gimbal on an IMU, a shooter."""
-from board.remote import BAUD
+from board.remote import BAUD, DOWN
 from machines import ARM_AT_US, CYCLE_US, FAULT_AT_US, FLYWHEELS, LOADER, PITCH, UP, YAW
 from rows.judge import LOST_US, START_US, WATCHDOG_US, drives_again, figures, must, rests, row, watched
 
@@ -60,6 +60,23 @@ def closed_loop(robot):
         "zero_us": first, "stale": 0, "note": "drives, follows its gimbal, shoots",
         "figures": figures(busy, jitter_us),
     }
+
+
+@row("F41", "fresh", "sentry")
+def armed_with_a_switch(robot):
+    """The right switch is turned to the top while the left one is at the top, then while it is at the bottom: neither arms."""
+    robot.remote.left_switch = UP
+    robot.run(300_000)
+    must(robot.commands() and not robot.driven(), "it was armed with the trigger held")
+    robot.ask_to_arm(False)
+    robot.remote.channels[:], robot.remote.left_switch = (0.0,) * 4, DOWN
+    robot.at(450_000, lambda: robot.ask_to_arm(True))
+    robot.run(600_000)
+    must(not robot.driven(), "it was armed with the chassis to spin")
+    robot.arm_again(600_000)
+    robot.run(950_000)
+    must(robot.driven(900_000), "it does not drive after the left switch was turned to its middle")
+    return {"zero_us": robot.commands()[0].us, "stale": 0, "note": "arming needs the left switch in its middle"}
 
 
 @row("F21", needs="sentry")
