@@ -4,12 +4,13 @@
 
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M2006, M3508};
+use drivetrain::encoder::Position;
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::shooter::{Shooter, ShooterFeedback, ShooterOrder, ShooterState, ShooterTargets};
 use drivetrain::sim::{Controller, Fault, Line, MotorConfig, MotorKey, Simulation};
-use drivetrain::time::{Duration, Instant};
-use drivetrain::units::AngularVelocity;
-use drivetrain::wire::referee::{Referee, encode};
+use drivetrain::time::{Duration, Instant, Tick};
+use drivetrain::units::{Angle, AngularVelocity};
+use drivetrain::wire::referee::{BarrelHeat, Referee, encode};
 
 const CHAMBERS: u8 = 8;
 const WHEEL_RPM: f32 = 400.0;
@@ -338,4 +339,45 @@ fn for_practice_a_heat_limit_without_the_referee_system_holds() {
     range.run(ShooterOrder::Fire(255), 3_000, true);
     // 4 at once, then 1 in 1 s.
     assert!((6..=8).contains(&range.balls), "{}", range.balls);
+}
+
+/// The true way of a loader in chambers in 20 s of [`ShooterOrder::Fire`] with 1 shot, by the position that it reports at an angle.
+fn fired_once(reported: impl Fn(u64, f32) -> Position) -> (f32, Shooter) {
+    let mut shooter = Shooter::new(AngularVelocity::from_rpm(WHEEL_RPM), CHAMBERS, 10.0).unwrap();
+    let (mut targets, mut angle_rad) = (ShooterTargets::REST, 0.0);
+    for ms in 1..=20_000 {
+        let feedback = ShooterFeedback {
+            is_armed: true,
+            wheels: [Some(targets.wheels); 2],
+            loader: Some((reported(ms, angle_rad), targets.loader)),
+            heat: Some(BarrelHeat { heat: 0, limit: 100, cooling_per_s: 10 }),
+        };
+        let order = if ms < 100 { ShooterOrder::Spin } else { ShooterOrder::Fire(1) };
+        targets = shooter.update(order, &feedback, Tick::new(at_ms(ms), 0.001));
+        angle_rad += 0.001 * targets.loader.as_rad_per_s();
+    }
+    (angle_rad.to_degrees() * f32::from(CHAMBERS) / 360.0, shooter)
+}
+
+#[test]
+fn one_shot_is_at_most_one_chamber_when_the_loader_counts_anew_or_has_no_number() {
+    let at = |angle_rad| Position::from_angle(Angle::from_radians(angle_rad));
+    let (chambers, shooter) = fired_once(|_, angle_rad| at(angle_rad));
+    assert!((0.9..1.1).contains(&chambers) && shooter.shots() == 1, "{chambers}");
+
+    let nan = |ms, angle_rad| at(if ms > 150 { f32::NAN } else { angle_rad });
+    let (chambers, shooter) = fired_once(nan);
+    assert!(chambers < 1.0, "{chambers} chambers of a position that is NaN");
+    assert_eq!((shooter.state(), shooter.shots()), (ShooterState::LoaderLost, 0));
+
+    for turns in [-20, -1, 1, 20] {
+        let (chambers, shooter) = fired_once(|ms, angle_rad| {
+            let position = at(angle_rad);
+            Position::new(position.turns() + if ms > 150 { turns } else { 0 }, position.angle())
+        });
+        assert!(chambers < 1.0, "{chambers} chambers of a position {turns} turns further");
+        // A jump forward passes the chamber of the shot.
+        let shots = u32::from(turns > 0);
+        assert_eq!((shooter.state(), shooter.shots()), (ShooterState::LoaderLost, shots));
+    }
 }

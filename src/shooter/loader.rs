@@ -12,6 +12,10 @@ const STANDS_SHARE: f32 = 0.2;
 const BACK_S: f32 = 0.2;
 /// Length of the turn back, in chambers.
 const BACK_SHARE: f32 = 0.5;
+/// Distance beyond the chambers to come at which the grid is not known any more, in chambers.
+const LOST_SHARE: f32 = 1.0;
+/// Turn by its measured velocity after which a loader must have passed a chamber, in chambers: less than two, so no second ball follows.
+const UNCOUNTED_SHARE: f32 = 1.0 + NEXT_SHARE;
 
 /// Result of a step of the loader.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,6 +28,8 @@ pub(super) enum Feed {
     Back(f32),
     /// Stood again after the last attempt.
     Jammed,
+    /// The position contradicts the chambers to come, or the measured velocity.
+    Lost,
 }
 
 /// A chamber of the grid, as turns and chambers since the first. A count of chambers alone would need a 64-bit division.
@@ -74,6 +80,8 @@ pub(super) struct Loader {
     /// The last chamber passed, and the number of chambers to follow: released shots.
     counted: Chamber,
     waiting: u8,
+    /// Turn since the last count by the measured velocity, in rad.
+    turned_rad: f32,
     stood_s: f32,
     /// Rest of the time for the turn back in s, and distance to the goal in rad at its beginning.
     back: Option<(f32, f32)>,
@@ -88,6 +96,7 @@ impl Loader {
             home: None,
             counted: Chamber::FIRST,
             waiting: 0,
+            turned_rad: 0.0,
             stood_s: 0.0,
             back: None,
             tries: 0,
@@ -97,7 +106,7 @@ impl Loader {
     /// Drops pending shots.
     pub(super) fn stop(&mut self) {
         self.waiting = 0;
-        self.stood_s = 0.0;
+        (self.turned_rad, self.stood_s) = (0.0, 0.0);
         self.back = None;
         self.tries = 0;
     }
@@ -148,17 +157,23 @@ impl Loader {
     ) -> (Feed, u32) {
         let pitch = self.pitch_rad();
         let mut counted = 0;
+        let turned_rad = self.turned_rad + velocity.as_rad_per_s() * dt_s;
+        self.turned_rad = turned_rad.max(-LOST_SHARE * pitch);
         while self.is_feeding() && self.way_rad(position, self.ahead(1)) <= COUNTED_SHARE * pitch {
             self.counted = self.ahead(1);
             self.waiting -= 1;
             counted += 1;
-            (self.stood_s, self.back, self.tries) = (0.0, None, 0);
-        }
-        if !self.is_feeding() {
-            self.stood_s = 0.0;
-            return (Feed::Idle, counted);
+            (self.turned_rad, self.stood_s) = (0.0, 0.0);
+            (self.back, self.tries) = (None, 0);
         }
         let way = self.way_rad(position, self.ahead(self.waiting));
+        if self.is_lost(way / pitch) {
+            return (Feed::Lost, counted);
+        }
+        if !self.is_feeding() {
+            (self.turned_rad, self.stood_s) = (0.0, 0.0);
+            return (Feed::Idle, counted);
+        }
         if let Some((left_s, from)) = self.back {
             let left_s = left_s - dt_s;
             let is_done = left_s <= 0.0 || way - from >= BACK_SHARE * pitch;
@@ -178,6 +193,14 @@ impl Loader {
         self.tries += 1;
         self.back = Some((BACK_S, way));
         (Feed::Back(-feed), counted)
+    }
+
+    /// Tells whether a distance to the goal, in chambers, or the turn without a count shows a position that is not that of the shaft.
+    fn is_lost(&self, way: f32) -> bool {
+        let to_come = f32::from(self.waiting) + BACK_SHARE * f32::from(self.tries);
+        let is_uncounted =
+            self.is_feeding() && self.turned_rad > UNCOUNTED_SHARE * self.pitch_rad();
+        way > to_come + LOST_SHARE || way < -LOST_SHARE || is_uncounted
     }
 
     const fn pitch_rad(&self) -> f32 {
@@ -240,6 +263,42 @@ mod tests {
         assert_eq!(loader.step(at(51.0, 5.0), RATES, 0.001), (Feed::Idle, 1));
         loader.admit();
         assert_eq!(loader.step(at(51.0, 0.0), RATES, 0.001), (Feed::Forward(5.0), 0));
+    }
+
+    /// The true way in chambers until the loader stops in a fault, or after 20 s: one shot of it, with what position and velocity are of each.
+    fn turned(reported: impl Fn(f32) -> (f32, f32)) -> (f32, bool) {
+        let mut loader = Loader::new(8, 3);
+        loader.start(at(0.0, 0.0).0);
+        loader.admit();
+        let (mut degrees, mut rad_per_s) = (0.0_f32, 0.0_f32);
+        for _ in 0..20_000 {
+            degrees += (0.001 * rad_per_s).to_degrees();
+            let (position, share) = reported(degrees);
+            rad_per_s = match loader.step(at(position, share * rad_per_s), RATES, 0.001).0 {
+                Feed::Forward(velocity) | Feed::Back(velocity) => velocity,
+                Feed::Idle => 0.0,
+                Feed::Jammed | Feed::Lost => return (degrees / 45.0, true),
+            };
+        }
+        (degrees / 45.0, false)
+    }
+
+    #[test]
+    fn a_position_that_jumps_or_stands_ends_the_shot_before_a_second_chamber() {
+        assert!((0.9..1.1).contains(&turned(|degrees| (degrees, 1.0)).0));
+        for jump in [-7_200.0, -360.0, -90.0, -46.0, -45.0, -30.0, 90.0, 360.0] {
+            for from in [1.0, 20.0, 39.0] {
+                let (way, _) = turned(|is| (if is > from { is + jump } else { is }, 1.0));
+                assert!(way < 1.6, "{jump} from {from}: {way} chambers");
+            }
+        }
+        let (way, is_fault) = turned(|is| (if is > 20.0 { is - 7_200.0 } else { is }, 1.0));
+        assert!(is_fault && way < 0.5, "{way} chambers");
+        // Of each chamber anew, and a position that stands while the shaft turns.
+        let (way, is_fault) = turned(|is| (is % 20.0, 1.0));
+        assert!(is_fault && way < 1.6, "{way} chambers");
+        let (way, is_fault) = turned(|is| (is.min(20.0), 1.0));
+        assert!(is_fault && way < 1.6, "{way} chambers");
     }
 
     #[test]

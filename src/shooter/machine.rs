@@ -15,6 +15,17 @@ const LONGEST_STEP_S: f32 = 0.1;
 
 /// Two friction wheels and a loader: see the [module](crate::shooter).
 ///
+/// No more chambers pass than ordered. A position that cannot be that of the loader ends the shot, with
+/// [`LoaderLost`](ShooterState::LoaderLost):
+///
+/// | feedback of the loader | example | the shooter stops |
+/// |---|---|---|
+/// | position or velocity is NaN or infinite | | at once |
+/// | the goal lies further away than the shots to come and a chamber, or a chamber back | `set_present_position`, a drive that counts anew | at once |
+/// | by its velocity, the loader has turned by one and a half chambers since the last count | a smaller jump, a position that stands | at most half a chamber late |
+///
+/// Each turn back from a jam adds half a chamber to the distance of the goal.
+///
 /// # Examples
 /// One shot, with motors that follow at once:
 /// ```
@@ -197,7 +208,10 @@ impl Shooter {
         if self.state.is_fault() {
             return ShooterTargets::REST;
         }
-        let (wheels, loader) = match (feedback.wheels, feedback.loader) {
+        let known = feedback
+            .loader
+            .filter(|(position, velocity)| position.is_finite() && velocity.is_finite());
+        let (wheels, loader) = match (feedback.wheels, known) {
             ([Some(left), Some(right)], Some(loader)) => ([left, right], loader),
             ([Some(_), Some(_)], None) => return self.fail(ShooterState::LoaderLost),
             _ => return self.fail(ShooterState::WheelLost),
@@ -271,6 +285,7 @@ impl Shooter {
         self.shots = self.shots.saturating_add(counted);
         let (state, loader) = match step {
             Feed::Jammed => return self.fail(ShooterState::Jammed),
+            Feed::Lost => return self.fail(ShooterState::LoaderLost),
             Feed::Forward(velocity) => (ShooterState::Feeding, velocity),
             Feed::Back(velocity) => (ShooterState::Clearing, velocity),
             Feed::Idle if !is_settled => (ShooterState::SpinningUp, 0.0),

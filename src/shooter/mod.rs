@@ -92,7 +92,7 @@ pub enum ShooterState {
     WheelLost,
     /// Fault: a friction wheel is not within the tolerance after 3 s of spinning up.
     WheelSlow,
-    /// Fault: the loader has no fresh feedback.
+    /// Fault: the loader has no fresh feedback, or a position that cannot be its own: see [`Shooter`].
     LoaderLost,
     /// Fault: the loader stood again after the last attempt to clear it.
     Jammed,
@@ -125,7 +125,7 @@ impl core::fmt::Display for ShooterState {
             Self::Cooling => "a shot waits for the heat of the barrel",
             Self::WheelLost => "a friction wheel has no fresh feedback",
             Self::WheelSlow => "a friction wheel did not reach its speed in 3 s",
-            Self::LoaderLost => "the loader has no fresh feedback",
+            Self::LoaderLost => "the loader has no fresh feedback, or a wrong position",
             Self::Jammed => "the loader is jammed: clear it, then order rest",
         })
     }
@@ -140,7 +140,7 @@ pub struct ShooterFeedback {
     /// Speeds of the friction wheels, positive in the shooting direction; `None` without fresh feedback.
     pub wheels: [Option<AngularVelocity>; 2],
     /// Position and velocity of the loader's output shaft, positive in the feeding direction, the position from any zero; `None` without
-    /// fresh feedback.
+    /// fresh feedback. A value that is NaN or infinite counts as `None`.
     pub loader: Option<(Position, AngularVelocity)>,
     /// Heat of the barrel; `None` while the referee system is silent.
     pub heat: Option<BarrelHeat>,
