@@ -1,3 +1,4 @@
+use super::COMMAND_TIMEOUT_S;
 use super::leg::{BalanceModel, GRAVITY, LegEffort, LegState};
 use crate::control::state_space::{GainSchedule, LinearQuadraticRegulator, bryson};
 use crate::error::ConfigError;
@@ -36,6 +37,7 @@ const ROWS: usize = 8;
 /// |---|---|---|
 /// | fall | roll or pitch beyond 40°; no attitude, no leg, a value that is NaN | `None` in this update and until [`start`](Self::start) |
 /// | slip | the wheels differ by more than 1.2 m/s from the plant's model, which gets their efforts | what is beyond does not count, the place is not held |
+/// | command | no [`set_motion`](Self::set_motion) in 0.1 s of updates | the motion counts as zero: the robot balances on the spot |
 /// | lift-off | both legs push less than a fifth of the body's weight for 10 ms | wheels without torque, until a leg carries two fifths |
 ///
 /// # Examples
@@ -79,6 +81,8 @@ pub struct Balancer {
     goal_m: f32,
     velocity_m_s: f32,
     yaw_rad_s: f32,
+    /// Of velocity and yaw rate, in steps of the updates.
+    command_age_s: f32,
     /// From the place to hold, in m.
     place_m: f32,
     /// From the heading to hold, in rad.
@@ -176,6 +180,7 @@ impl Balancer {
             goal_m: 0.5 * (least + largest),
             velocity_m_s: 0.0,
             yaw_rad_s: 0.0,
+            command_age_s: f32::MAX,
             place_m: 0.0,
             heading_rad: 0.0,
             trim_nm: 0.0,
@@ -200,9 +205,13 @@ impl Balancer {
     }
 
     /// Sets velocity in m/s, forward positive, and yaw rate in rad/s, counter-clockwise positive. A value that is NaN or infinite counts as zero.
+    ///
+    /// A command not renewed for 0.1 s counts as zero, as that of a [`Chassis`](super::Chassis); its age is the time of the updates since,
+    /// a time step each. Each call has to stand for a fresh command of the pilot.
     pub const fn set_motion(&mut self, velocity_m_s: f32, yaw_rad_s: f32) {
         self.velocity_m_s = if velocity_m_s.is_finite() { velocity_m_s } else { 0.0 };
         self.yaw_rad_s = if yaw_rad_s.is_finite() { yaw_rad_s } else { 0.0 };
+        self.command_age_s = 0.0;
     }
 
     /// Sets the length of the legs in m, within those of the constructor; NaN is the least. The length changes by 0.2 m/s.
@@ -235,6 +244,10 @@ impl Balancer {
         legs: Option<[LegState; 2]>,
         wheels: [AngularVelocity; 2],
     ) -> Option<[LegEffort; 2]> {
+        if self.command_age_s > COMMAND_TIMEOUT_S {
+            (self.velocity_m_s, self.yaw_rad_s) = (0.0, 0.0);
+        }
+        self.command_age_s += self.dt_s;
         let measured = attitude.zip(legs).filter(|_| self.phase != BalancePhase::Fallen);
         let result = measured.and_then(|(attitude, legs)| self.step(attitude, &legs, wheels));
         if result.is_none() {
@@ -546,6 +559,34 @@ mod tests {
         assert!((robot.goal_m - 0.14).abs() < 1e-6);
         robot.set_length(1.0);
         assert!((robot.goal_m - 0.36).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_motion_that_nobody_renews_for_100_ms_is_a_standstill_and_a_renewed_one_goes_on() {
+        let target = |robot: &Balancer| (robot.velocity_m_s, robot.yaw_rad_s);
+        let mut robot = standing();
+        robot.set_motion(1.0, 2.0);
+        upright(&mut robot, 99, 0.25, 69.0);
+        assert_eq!(target(&robot), (1.0, 2.0));
+        // A pilot that is dead: the balance goes on, toward zero.
+        upright(&mut robot, 3, 0.25, 69.0);
+        assert_eq!((target(&robot), robot.phase()), ((0.0, 0.0), BalancePhase::Standing));
+        let mut told = robot;
+        told.set_motion(0.0, 0.0);
+        assert_eq!(upright(&mut robot, 9, 0.25, 69.0), upright(&mut told, 9, 0.25, 69.0));
+        for _ in 0..50 {
+            robot.set_motion(1.0, 2.0);
+            upright(&mut robot, 10, 0.25, 69.0);
+        }
+        assert_eq!(target(&robot), (1.0, 2.0));
+        // It ages while the robot lies, too.
+        robot.stop();
+        for _ in 0..150 {
+            assert_eq!(robot.update(None, None, REST), None);
+        }
+        robot.start();
+        upright(&mut robot, 1, 0.25, 69.0);
+        assert_eq!(target(&robot), (0.0, 0.0));
     }
 
     #[test]

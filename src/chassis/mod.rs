@@ -108,6 +108,8 @@ use crate::geometry::{Twist, World};
 use crate::motor::TargetError;
 use crate::units::AngularVelocity;
 
+/// For so long a command drives that nobody renews, unless the application sets another time.
+const COMMAND_TIMEOUT_S: f32 = 0.1;
 /// The longest time for which a command may drive: the deadline of a motor's target, which the chassis renews in each tick.
 const MAX_COMMAND_TIMEOUT_S: f32 = 1.0;
 
@@ -140,7 +142,7 @@ impl ChassisLimits {
             linear_m_s2: f32::MAX,
             angular_rad_s2: f32::MAX,
             wheel_rad_s: f32::MAX,
-            command_timeout_s: 0.1,
+            command_timeout_s: COMMAND_TIMEOUT_S,
         }
     }
 
