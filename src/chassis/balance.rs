@@ -1,5 +1,5 @@
-use super::COMMAND_TIMEOUT_S;
 use super::leg::{BalanceModel, GRAVITY, LegEffort, LegState};
+use super::{COMMAND_TIMEOUT_S, within};
 use crate::control::state_space::{GainSchedule, LinearQuadraticRegulator, bryson};
 use crate::error::ConfigError;
 use crate::geometry::Attitude;
@@ -71,6 +71,8 @@ pub struct Balancer {
     weight_n: f32,
     dt_s: f32,
     lengths_m: [f32; 2],
+    /// Of both wheels, and of both hips.
+    limit_nm: [f32; 2],
     gains: GainSchedule<6, 2, ROWS>,
     /// Next velocity of the wheels, from the states and both inputs.
     motion: GainSchedule<8, 1, ROWS>,
@@ -133,7 +135,8 @@ const FALL: f32 = 0.7;
 impl Balancer {
     /// Calculates the gains for leg lengths from the least to the largest, in m, of which the least is that of rising.
     ///
-    /// `limit_nm` are the largest torques of both wheels, and of both hips, together; `dt_s` is the time step of the updates in s.
+    /// `limit_nm` are the largest torques of both wheels, and of both hips, together: half of it is the limit of each, in every phase. The
+    /// balance comes first, and turns and the difference between the legs get what it leaves. `dt_s` is the time step of the updates in s.
     /// Solves eight Riccati equations: at start, not in the loop.
     ///
     /// # Errors
@@ -172,6 +175,7 @@ impl Balancer {
             weight_n: GRAVITY * model.body_kg,
             dt_s,
             lengths_m,
+            limit_nm,
             gains: GainSchedule::new(gains)?,
             motion: GainSchedule::new(motion)?,
             regulator: LinearQuadraticRegulator::from_gain(&first)?.with_output_limit(&limit_nm)?,
@@ -298,8 +302,6 @@ impl Balancer {
         } else {
             hip
         };
-        self.torques_nm = [wheel, hip];
-
         let (_, cos) = sin_cos(lean);
         let turn = if is_airborne {
             0.0
@@ -308,17 +310,27 @@ impl Balancer {
         };
         let split = SPLIT.0 * (left.angle_rad - right.angle_rad)
             + SPLIT.1 * (left.angle_rad_s - right.angle_rad_s);
+        // A limit would hide an infinite value.
+        if !(wheel + hip + turn + split).is_finite() {
+            return None;
+        }
+        let [wheels_nm, hips_nm] = self.limit_nm;
+        self.torques_nm = [within(wheel, wheels_nm), within(hip, hips_nm)];
+        let [wheel, hip] = self.torques_nm.map(|of_both| 0.5 * of_both);
+        // A motor at its limit has no torque for both: without the balance the robot falls, without the turn it is late.
+        let turn = within(turn, 0.5 * wheels_nm - wheel.abs());
+        let split = within(split, 0.5 * hips_nm - hip.abs());
         let tilt = ROLL.0 * roll + ROLL.1 * roll_rate;
         let effort = |leg: &LegState, side: f32| LegEffort {
             force_n: 0.5 * self.weight_n * cos + LENGTH.0 * (self.length_m - leg.length_m)
                 - LENGTH.1 * leg.length_m_s
                 - side * tilt,
-            hip_nm: 0.5 * hip - side * split,
-            wheel_nm: 0.5 * wheel + side * turn,
+            // The sum can round to a value beyond the limit.
+            hip_nm: within(hip - side * split, 0.5 * hips_nm),
+            wheel_nm: within(wheel + side * turn, 0.5 * wheels_nm),
         };
         let efforts = [effort(left, 1.0), effort(right, -1.0)];
-        let is_finite = |it: &LegEffort| (it.force_n + it.hip_nm + it.wheel_nm).is_finite();
-        efforts.iter().all(is_finite).then_some(efforts)
+        efforts.iter().all(|it| it.force_n.is_finite()).then_some(efforts)
     }
 
     /// Notes lift-off and landing.
@@ -351,7 +363,7 @@ impl Balancer {
         self.is_slipping = off.abs() > SLIP.0;
         self.model_m_s = expected + SLIP.1 * self.dt_s * off;
         // Not the model's velocity: with the torque of the wheels in it, the loop would run away from a push.
-        off.is_finite().then_some(expected + off.max(-SLIP.0).min(SLIP.0))
+        off.is_finite().then_some(expected + within(off, SLIP.0))
     }
 
     /// Moves the length to its goal, once balance was found.
@@ -368,7 +380,7 @@ impl Balancer {
         }
         let way = goal_m - self.length_m;
         let step = EXTENSION * self.dt_s;
-        self.length_m += way.max(-step).min(step);
+        self.length_m += within(way, step);
         if self.phase == BalancePhase::Rising && self.due_s >= FOUND_S && way.abs() <= step {
             (self.phase, self.due_s) = (BalancePhase::Standing, 0.0);
         }
@@ -379,7 +391,6 @@ impl Balancer {
         if !is_standing || self.is_slipping {
             return;
         }
-        let within = |value: f32, limit: f32| value.max(-limit).min(limit);
         self.place_m = within(self.place_m + (velocity - self.velocity_m_s) * self.dt_s, FAR.0);
         self.heading_rad =
             within(self.heading_rad + (yaw_rate - self.yaw_rad_s) * self.dt_s, FAR.1);
@@ -392,6 +403,7 @@ mod tests {
     use super::*;
     use crate::chassis::FiveBar;
     use crate::geometry::Rotation3;
+    use proptest::prelude::*;
 
     const MODEL: BalanceModel = BalanceModel {
         wheel_radius_m: 0.075,
@@ -587,6 +599,83 @@ mod tests {
         robot.start();
         upright(&mut robot, 1, 0.25, 69.0);
         assert_eq!(target(&robot), (0.0, 0.0));
+    }
+
+    #[test]
+    fn a_turn_and_a_split_get_the_torque_that_the_balance_leaves() {
+        let mut robot = standing();
+        robot.set_motion(0.0, 6.0);
+        let [left, right] = upright(&mut robot, 1, 0.25, 69.0);
+        assert!(right.wheel_nm <= 5.0 && left.wheel_nm >= -5.0, "{left:?} {right:?}");
+        assert!(right.wheel_nm - left.wheel_nm > 9.0, "{left:?} {right:?}");
+        // The balance needs everything: both wheels drive under the body, and the turn waits.
+        let legs = Some([leg(0.25, 69.0); 2]);
+        let [left, right] = robot.update(Some(&tilted(0.0, 0.5)), legs, REST).unwrap();
+        assert_eq!((left.wheel_nm, right.wheel_nm), (5.0, 5.0));
+        // Hips that swing both legs back, and legs that are apart.
+        let mut legs = [leg(0.25, 69.0); 2];
+        (legs[0].angle_rad, legs[1].angle_rad) = (2.6, 2.0);
+        let [left, right] = robot.update(Some(&tilted(0.0, 0.0)), Some(legs), REST).unwrap();
+        assert_eq!((left.hip_nm, right.hip_nm), (-25.0, -25.0));
+    }
+
+    fn any() -> impl Strategy<Value = f32> {
+        prop_oneof![
+            30 => -0.6_f32..0.6,
+            10 => -50.0_f32..50.0,
+            1 => proptest::num::f32::ANY,
+            1 => prop_oneof![Just(f32::NAN), Just(f32::INFINITY), Just(f32::NEG_INFINITY)],
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn each_wheel_and_each_hip_keeps_half_of_the_limit_and_a_turn_takes_nothing_of_the_balance(
+            limits in [0.1_f32..40.0, 0.1_f32..200.0],
+            phase in prop_oneof![
+                Just(BalancePhase::Rising),
+                Just(BalancePhase::Standing),
+                Just(BalancePhase::Airborne),
+            ],
+            held in [any(), any(), any()],
+            updates in prop::collection::vec(
+                ([any(), any()], [any(), any(), any()], [any(), any()], [any(), any()], [any(), any()]),
+                1..8,
+            ),
+            force_n in 0.0..140.0_f32,
+        ) {
+            let mut robot = Balancer::new(&MODEL, [0.14, 0.36], limits, 0.001).unwrap();
+            robot.start();
+            robot.phase = phase;
+            let [place, heading, trim] = held.map(|part| if part.is_finite() { part } else { 0.0 });
+            robot.place_m = within(place, FAR.0);
+            robot.heading_rad = within(heading, FAR.1);
+            robot.trim_nm = within(trim, TRIM.1);
+            for (motion, [roll, pitch, wheel], [pitch_rate, yaw_rate], left, right) in updates {
+                robot.set_motion(motion[0], motion[1]);
+                let rates = [0.0, pitch_rate, yaw_rate].map(AngularVelocity::from_rad_per_s);
+                let attitude = Attitude { rates, ..tilted(roll, pitch) };
+                let legs = [left, right].map(|[angle_rad, rate_rad_s]| {
+                    let mut leg = leg(0.25, force_n);
+                    (leg.angle_rad, leg.angle_rad_s) = (angle_rad, rate_rad_s);
+                    leg
+                });
+                let wheels = [AngularVelocity::from_rad_per_s(wheel); 2];
+                let mut straight = robot;
+                straight.set_motion(motion[0], 0.0);
+                let straight = straight.update(Some(&attitude), Some(legs), wheels);
+                let efforts = robot.update(Some(&attitude), Some(legs), wheels);
+                if let (Some([left, right]), Some([other, one])) = (efforts, straight) {
+                    let taken = left.wheel_nm + right.wheel_nm - other.wheel_nm - one.wheel_nm;
+                    prop_assert!(taken.abs() <= 1e-5 * limits[0], "{taken} Nm of the balance");
+                }
+                for effort in efforts.into_iter().flatten() {
+                    prop_assert!(effort.wheel_nm.abs() <= 0.5 * limits[0], "{effort:?}");
+                    prop_assert!(effort.hip_nm.abs() <= 0.5 * limits[1], "{effort:?}");
+                    prop_assert!(effort.force_n.is_finite(), "{effort:?}");
+                }
+            }
+        }
     }
 
     #[test]

@@ -273,6 +273,11 @@ fn not_negative(value: f32, name: &'static str) -> Result<f32, ConfigError> {
     if value.is_finite() && value >= 0.0 { Ok(value) } else { Err(ConfigError::Negative(name)) }
 }
 
+/// Limits a value to ± a limit of zero or more.
+const fn within(value: f32, limit: f32) -> f32 {
+    crate::math::limited(value, -limit, limit)
+}
+
 /// Counts the ticks without usable time: ages in seconds stand still in them.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 struct DeadClock(u8);
