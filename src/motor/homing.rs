@@ -94,7 +94,7 @@ impl core::fmt::Display for HomingStep {
 ///
 /// let world = Simulation::new(1);
 /// let stops = (Angle::from_degrees(-90.0), Angle::from_degrees(90.0)); // from where it starts
-/// world.attach(MotorConfig::m2006(1).with_stops(stops.0, stops.1))?;
+/// let motor = world.attach(MotorConfig::m2006(1).with_stops(stops.0, stops.1))?;
 /// let mut bus = Bus::new();
 /// let limit = Current::from_amperes(3.0);
 /// let speed = PidConfig::new(0.2, 3.0, 0.0); // A per rad/s, A per rad
@@ -102,8 +102,8 @@ impl core::fmt::Display for HomingStep {
 /// let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
 ///
 /// let mut homing = StopHoming::new(AngularVelocity::from_rpm(-30.0), 2.0)?;
-/// let mut homed = false;
-/// while !homed {
+/// let mut end = None;
+/// while end.is_none() {
 ///     world.advance(Duration::from_millis(1));
 ///     runner.poll(16);
 ///     let Some(tick) = runner.due() else { continue };
@@ -116,12 +116,17 @@ impl core::fmt::Display for HomingStep {
 ///         match homing.step(shaft, tick) {
 ///             HomingStep::Drive(velocity) => bus.set_velocity(arm, velocity)?,
 ///             HomingStep::SetPresentPosition(position) => bus.set_present_position(arm, position)?,
-///             HomingStep::Done => homed = true,
-///             failed => return Err(failed.to_string().into()),
+///             last => {
+///                 bus.relax(arm); // done or failed: the tick below sends rest
+///                 end = Some(last);
+///             }
 ///         }
 ///     }
 ///     runner.tick(tick);
 /// }
+/// world.advance(Duration::from_millis(1));
+/// assert_eq!(world.motor(motor).ok_or("detached")?.command, 0);
+/// assert_eq!(end, Some(HomingStep::Done)); // a failure says its reason by `to_string`
 /// let state = runner.device().state(arm).ok_or("detached")?;
 /// assert!((state.position - Position::ZERO).as_degrees().abs() < 0.5);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
