@@ -241,7 +241,7 @@ impl Balancer {
     /// Takes the attitude of the body, the legs, and the velocities of the wheels against the bars that carry their motors, positive
     /// forward; left, right each. `None`: the robot has fallen, or a value is missing, NaN or infinite; disarm the motors at once.
     ///
-    /// Costs 1438 instructions on a Cortex-M4F (`docs/figures.md`).
+    /// Costs 1424 instructions on a Cortex-M4F (`docs/figures.md`).
     pub fn update(
         &mut self,
         attitude: Option<&Attitude>,

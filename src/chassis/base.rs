@@ -240,11 +240,11 @@ impl<K: Kinematics> Chassis<K> {
         }
         let turned = if counted { self.measured.wz_rad_s * dt_s } else { 0.0 };
         let heading = self.odometry.heading();
-        let expected = Heading::new(before.angle() + Angle::from_radians(turned));
-        let error = math::wrap_pi((heading.angle() - expected.angle()).as_radians());
+        let expected = before.angle() + Angle::from_radians(turned);
+        let error = math::wrap_pi((heading.angle() - expected).as_radians());
         if self.odometry.has_gyro() && (!had_gyro || error.abs() > Self::JUMP_RAD) {
             // The heading jumps; the robot does not.
-            self.reference = self.reference.to_body(expected).to_world(heading);
+            self.reference = self.reference.to_body(Heading::new(expected)).to_world(heading);
         }
     }
 
