@@ -83,8 +83,10 @@ impl WatchedStop {
         is_set
     }
 
-    pub(super) fn clear(&self) {
+    /// Clears the stop. If the device is stopped, a stop since the last tick is cleared too; otherwise the next tick takes it.
+    pub(super) fn clear(&mut self, is_stopped: bool) {
         if let Some(stop) = self.stop {
+            self.seen = if is_stopped { stop.sets() } else { self.seen };
             stop.clear();
         }
     }

@@ -325,40 +325,6 @@ fn the_emergency_stop_acts_on_the_next_tick_and_stays() {
 }
 
 #[test]
-fn a_stop_that_is_cleared_before_the_tick_stops_and_needs_a_clear_of_each_runner() {
-    static STOP: EmergencyStop = EmergencyStop::new();
-    STOP.set();
-    STOP.clear();
-    let clock = Cell::new(Instant::from_micros(1_000));
-    let mut runners = [0; 2].map(|_| {
-        let (runner, wheels) = driving(&clock);
-        (runner.with_emergency_stop(&STOP), wheels)
-    });
-    let step = |(runner, wheels): &mut (TestRunner<'_>, _), now| {
-        hear(runner, &Cell::new(now));
-        set(runner, *wheels, 50);
-        runner.tick(Tick::new(now, 0.001));
-        offered(runner).into_iter().map(|(_, raw)| raw).collect::<Vec<_>>()
-    };
-    let at_ms = |ms: u64| Instant::from_micros(1_000 * ms);
-    assert_eq!(step(&mut runners[0], at_ms(2)), [50, 50], "set before the stop was watched");
-    STOP.set();
-    STOP.clear(); // a button that bounces
-    assert_eq!(runners[0].0.arm(Tick::new(at_ms(2), 0.001)), Err(ArmError::Stopped));
-    for (runner, wheels) in &mut runners {
-        assert!(runner.device_mut().set_raw(wheels[0], 51).is_ok(), "until the tick");
-        runner.tick(Tick::new(at_ms(3), 0.001));
-        assert_eq!(offered(runner).iter().map(|(_, raw)| *raw).max(), Some(0));
-        assert!(runner.device_mut().set_raw(wheels[0], 51).is_err());
-        STOP.set();
-        runner.clear_emergency_stop(); // of this one; the other has not run since
-    }
-    let [(one, _), _] = &mut runners;
-    one.tick(Tick::new(at_ms(4), 0.001));
-    assert!(one.device().is_stopped(), "set again after the tick before");
-}
-
-#[test]
 fn frames_add_up() {
     let clock = Cell::new(Instant::from_micros(1_000));
     let (mut runner, wheels) = driving(&clock);
