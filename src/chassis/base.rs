@@ -19,8 +19,10 @@ use crate::units::Angle;
 ///    see [`Swerve::steer`](super::Swerve::steer).
 ///
 /// A command that is NaN or infinite, or faster than 1e19 m/s, stops the chassis and is counted. A command not renewed
-/// for 0.1 s counts as zero; so does, in the first tick after a pause of as long, the command of before the tick. A heading that
-/// jumps by more than 0.2 rad against the wheels turns the pose, and not the motion of the wheels. A `dt` that is zero, negative, NaN or infinite moves neither pose nor command; a `dt` over
+/// for 0.1 s counts as zero. After a pause of as long, in which the chassis was not updated, the motion starts over from the wheels,
+/// and a command that was set before this tick counts as zero: the next one counts. When the heading jumps by more than 0.2 rad
+/// against the wheels, as of a gyroscope that starts again, the wheels go on as before, and a command in the world is approached from
+/// there: set the limits of the acceleration, or the wheels jump with the command. A `dt` that is zero, negative, NaN or infinite moves neither pose nor command; a `dt` over
 /// 0.1 s counts as 0.1 s for the acceleration, and a `dt` over 1 s moves no pose. In the 100th tick in a row without
 /// usable time the clock is dead: the command counts as stale, and since no ramp can be timed, the wheels stop at once.
 ///
@@ -183,8 +185,14 @@ impl<K: Kinematics> Chassis<K> {
         let dt_s = self.clock.take_step(tick.dt_s());
         self.measure(measured, dt_s);
         let heading = self.odometry.heading();
-        let missed_s = self.passed(tick.now()).as_secs_f32() - dt_s;
-        let target = self.target(dt_s, missed_s).to_world(heading);
+        // Updates were left out for so long, and nobody knows when the command came, nor what the wheels did.
+        let is_paused =
+            self.passed(tick.now()).as_secs_f32() - dt_s > self.limits.command_timeout_s();
+        if is_paused {
+            self.take_over();
+            (self.command_age_s, self.is_renewed) = (f32::MAX, false);
+        }
+        let target = self.target(dt_s).to_world(heading);
         let step_s = if dt_s > Self::MAX_STEP_S { Self::MAX_STEP_S } else { dt_s };
         self.reference = if self.clock.is_dead() {
             Twist::ZERO
@@ -254,17 +262,12 @@ impl<K: Kinematics> Chassis<K> {
         before.map_or(Duration::ZERO, |before| now.since(before))
     }
 
-    fn target(&mut self, dt_s: f32, missed_s: f32) -> Twist<Body> {
-        let timeout_s = self.limits.command_timeout_s();
-        // Updates were left out for so long, and nobody knows when the command came.
-        let is_paused = missed_s > timeout_s;
-        let is_new = core::mem::take(&mut self.is_renewed) && !is_paused;
+    fn target(&mut self, dt_s: f32) -> Twist<Body> {
         // The step came before a new command, and after an old command.
-        self.command_age_s = if is_new { 0.0 } else { self.command_age_s + dt_s };
-        if is_paused {
-            self.command_age_s = f32::MAX;
-        }
-        self.status.command_stale = self.clock.is_dead() || self.command_age_s > timeout_s;
+        self.command_age_s = if self.is_renewed { 0.0 } else { self.command_age_s + dt_s };
+        self.is_renewed = false;
+        self.status.command_stale =
+            self.clock.is_dead() || self.command_age_s > self.limits.command_timeout_s();
         match self.command {
             _ if self.status.command_stale => Twist::ZERO,
             Command::Lock => Twist::ZERO,
@@ -730,6 +733,31 @@ mod tests {
             chassis.set_body(Twist::new(1.0, 0.0, 0.0));
             chassis.update(NONE, Tick::new(Instant::from_micros(1_000 * ms), 0.4));
             assert!(!chassis.status().command_stale, "steps of a slow program");
+        }
+    }
+
+    #[test]
+    fn a_chassis_that_was_not_updated_for_a_while_starts_from_its_wheels() {
+        let limits = ChassisLimits::new().with_acceleration(2.0, 10.0);
+        let rolling = mecanum().inverse(Twist::new(0.3, 0.0, 0.0)).map(Some);
+        for (restarts, wheels, vx_m_s) in
+            [(false, NONE, 0.0), (true, NONE, 0.0), (false, rolling, 0.298)]
+        {
+            let mut chassis = limited(limits);
+            for ms in 0..2_000 {
+                chassis.set_body(Twist::new(1.0, 0.0, 0.0));
+                let wheels = mecanum().inverse(chassis.reference()).map(Some);
+                chassis.update(wheels, Tick::new(Instant::from_micros(1_000 * ms), 0.001));
+            }
+            assert!((chassis.reference().vx_m_s - 1.0).abs() < 1e-3);
+            if restarts {
+                chassis.restart();
+            }
+            // Disarmed, and stopped by hand.
+            chassis.stop();
+            chassis.update(wheels, Tick::new(Instant::from_micros(12_000_000), 0.001));
+            let motion = chassis.reference();
+            assert!((motion.vx_m_s - vx_m_s).abs() < 1e-4, "{motion:?}");
         }
     }
 

@@ -8,7 +8,10 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 ///
 /// The runner reads the stop in each tick; from that tick on every command is zero, until
 /// [`Runner::clear_emergency_stop`](super::Runner::clear_emergency_stop) and arming again. A stop set and cleared between two
-/// ticks counts, and each runner with the stop needs a clear of its own.
+/// ticks counts, and each runner with the stop needs a clear of its own: of two buses of one robot, clear both, then arm both.
+///
+/// The stop does not know the button. Clear it when the button is released and no longer bounces: a later edge stops again, and a
+/// button that is still pressed does not.
 ///
 /// # Examples
 /// ```
@@ -39,7 +42,8 @@ impl EmergencyStop {
         self.is_set.store(true, Ordering::Release);
     }
 
-    /// Clears the stop; stopped motors stay stopped until [`Runner::clear_emergency_stop`](super::Runner::clear_emergency_stop).
+    /// Clears the stop alone. A program calls [`Runner::clear_emergency_stop`](super::Runner::clear_emergency_stop) instead: what a runner
+    /// has stopped stays stopped until then.
     pub fn clear(&self) {
         self.is_set.store(false, Ordering::Release);
     }

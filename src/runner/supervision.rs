@@ -59,7 +59,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         self
     }
 
-    /// Watches an emergency stop.
+    /// Watches an emergency stop: see [`EmergencyStop`].
     #[must_use]
     pub fn with_emergency_stop(mut self, stop: &'static EmergencyStop) -> Self {
         self.stop = WatchedStop::new(stop);

@@ -15,7 +15,7 @@ const LONGEST_STEP_S: f32 = 0.1;
 
 /// Two friction wheels and a loader: see the [module](crate::shooter).
 ///
-/// No more chambers pass than ordered. A position that cannot be that of the loader ends the shot, with
+/// While the position is right, no more chambers pass than ordered. A position that cannot be that of the loader ends the shot, with
 /// [`LoaderLost`](ShooterState::LoaderLost):
 ///
 /// | feedback of the loader | example | the shooter stops |
@@ -24,7 +24,8 @@ const LONGEST_STEP_S: f32 = 0.1;
 /// | the goal lies further away than the shots to come and a chamber, or a chamber back | `set_present_position`, a drive that counts anew | at once |
 /// | by its velocity, the loader has turned by one and a half chambers since the last count | a smaller jump, a position that stands | at most half a chamber late |
 ///
-/// Each turn back from a jam adds half a chamber to the distance of the goal.
+/// Each turn back from a jam adds half a chamber to the distance of the goal. **After a wrong position the chambers stand elsewhere**: an order
+/// to rest ends the fault, and further shots end between two chambers. Turn the loader to a chamber, and make a new `Shooter`.
 ///
 /// # Examples
 /// One shot, with motors that follow at once:

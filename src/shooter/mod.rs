@@ -92,7 +92,7 @@ pub enum ShooterState {
     WheelLost,
     /// Fault: a friction wheel is not within the tolerance after 3 s of spinning up.
     WheelSlow,
-    /// Fault: the loader has no fresh feedback, or a position that cannot be its own: see [`Shooter`].
+    /// Fault: the loader has no fresh feedback, or a position that cannot be its own; then its chambers are not known: see [`Shooter`].
     LoaderLost,
     /// Fault: the loader stood again after the last attempt to clear it.
     Jammed,

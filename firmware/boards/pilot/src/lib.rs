@@ -1,7 +1,7 @@
 //! What the boards share: the robots without their boards. Here a DBUS remote control and a HiPNUC IMU drive a mecanum chassis of
 //! four M3508; [`sentry`] and [`snake`] are whole machines.
 //!
-//! Arm: both sticks at rest, the left switch in its middle, turn the right switch from anywhere to the top. Stop: turn it away, or lose
+//! Arm: both sticks at rest, the left switch in its middle, turn the right switch from its middle or its bottom to the top. Stop: turn it away, or lose
 //! the remote.
 //! The right stick moves the chassis, the left one turns it. With an IMU that is heard, forward is where its yaw is zero;
 //! without one, forward is where the chassis looks. Which of them holds is chosen while both sticks are at rest; when the IMU

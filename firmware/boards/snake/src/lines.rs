@@ -63,7 +63,8 @@ pub async fn hear_servo(line: UartRx<'static, Async>) {
     .await
 }
 
-/// Torque, goal and question in turn, each 20 ms: the servo is released when the robot is not armed.
+/// Goal, torque and question in turn, each 20 ms: the servo is released when the robot is not armed. The goal goes first, for a servo
+/// whose torque is switched on drives to the goal of before.
 #[embassy_executor::task]
 pub async fn lead_servo(mut line: UartTx<'static, Async>) {
     static BYTES: StaticCell<[u8; feetech::MAX_FRAME]> = StaticCell::new();
@@ -71,11 +72,8 @@ pub async fn lead_servo(mut line: UartTx<'static, Async>) {
     let mut wake = Ticker::every(Duration::from_millis(20));
     loop {
         wake.next().await;
-        let is_armed = ARMED.try_get() == Some(true);
-        let torque = feetech::write(ServoId::ONE, register::TORQUE, &[is_armed.into()], buffer);
-        _ = line.write(torque.unwrap_or_default()).await;
-        Timer::after_millis(6).await;
-        if let (true, Some(command)) = (is_armed, COMMAND.try_get()) {
+        let command = COMMAND.try_get().filter(|_| ARMED.try_get() == Some(true));
+        if let Some(command) = &command {
             let counts =
                 i32::from(command.value.sts3032_degrees) * i32::from(feetech::COUNTS_PER_TURN);
             let position = i16::try_from(counts / 360).unwrap_or(i16::MAX);
@@ -83,6 +81,10 @@ pub async fn lead_servo(mut line: UartTx<'static, Async>) {
             let goal = feetech::write(ServoId::ONE, Goal::ADDRESS, &goal.to_bytes(), buffer);
             _ = line.write(goal.unwrap_or_default()).await;
         }
+        Timer::after_millis(6).await;
+        let is_on = [command.is_some().into()];
+        let torque = feetech::write(ServoId::ONE, register::TORQUE, &is_on, buffer);
+        _ = line.write(torque.unwrap_or_default()).await;
         Timer::after_millis(6).await;
         let question = feetech::read(ServoId::ONE, Present::ADDRESS, Present::LENGTH, buffer);
         _ = line.write(question.unwrap_or_default()).await;
