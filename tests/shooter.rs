@@ -381,3 +381,21 @@ fn one_shot_is_at_most_one_chamber_when_the_loader_counts_anew_or_has_no_number(
         assert_eq!((shooter.state(), shooter.shots()), (ShooterState::LoaderLost, shots));
     }
 }
+
+#[test]
+fn a_rest_of_a_tick_in_mid_fire_is_no_fault_of_the_loader() {
+    for rate in [10.0, 20.0] {
+        for cut in (1_000..1_200).step_by(8) {
+            let world = Simulation::new(1);
+            let speed = AngularVelocity::from_rpm(WHEEL_RPM);
+            let shooter = Shooter::new(speed, CHAMBERS, rate).unwrap();
+            let barrel = Barrel { limit: 600, cooling_per_s: 300 };
+            let mut range = Range::with(&world, Some(barrel), shooter);
+            range.run(ShooterOrder::Spin, 900, true);
+            range.run(ShooterOrder::Fire(20), cut - 900, true);
+            range.run(ShooterOrder::Rest, 1, true);
+            range.run(ShooterOrder::Spin, 400, true);
+            assert_ne!(range.shooter.state(), ShooterState::LoaderLost, "{rate}, {cut}");
+        }
+    }
+}

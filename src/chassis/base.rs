@@ -19,9 +19,9 @@ use crate::units::Angle;
 ///    see [`Swerve::steer`](super::Swerve::steer).
 ///
 /// A command that is NaN or infinite, or faster than 1e19 m/s, stops the chassis and is counted. A command not renewed
-/// for 0.1 s counts as zero. After a pause of as long, in which the chassis was not updated, the motion starts over from the wheels,
-/// and a command that was set before this tick counts as zero: the next one counts. When the heading jumps by more than 0.2 rad
-/// against the wheels, as of a gyroscope that starts again, the wheels go on as before, and a command in the world is approached from
+/// for 0.1 s counts as zero. After a pause of 0.5 s, in which the chassis was not updated, the motion starts over from the wheels,
+/// and a command that was set before this tick counts as zero: the next one counts. When a heading differs by more than 0.2 rad
+/// from the heading before and the turn of the wheels since, as of a gyroscope that starts again, the wheels go on as before, and a command in the world is approached from
 /// there: set the limits of the acceleration, or the wheels jump with the command. A `dt` that is zero, negative, NaN or infinite moves neither pose nor command; a `dt` over
 /// 0.1 s counts as 0.1 s for the acceleration, and a `dt` over 1 s moves no pose. In the 100th tick in a row without
 /// usable time the clock is dead: the command counts as stale, and since no ramp can be timed, the wheels stop at once.
@@ -48,6 +48,8 @@ pub struct Chassis<K: Kinematics> {
     command_age_s: f32,
     is_renewed: bool,
     updated: Option<Instant>,
+    /// Turn of the wheels, less that of the headings, since the last heading that differed; `None` if a part of it is not known.
+    unseen_rad: Option<f32>,
     clock: DeadClock,
     gyro: Option<Heading>,
     reference: Twist<World>,
@@ -68,8 +70,14 @@ impl<K: Kinematics> Chassis<K> {
     /// The longest step in seconds that counts in full for the acceleration limit.
     pub const MAX_STEP_S: f32 = 0.1;
 
-    /// No chassis turns so far within a tick against its wheels: 11°.
+    /// No chassis turns so far against its wheels from one heading of a gyroscope to the next: 11°.
     const JUMP_RAD: f32 = 0.2;
+
+    /// Wheels that turn so far beside one heading slip, or the heading is an old one.
+    const UNSEEN_RAD: f32 = 1.0;
+
+    /// Nobody knows what wheels did, and when a command came, in a pause of so long.
+    const PAUSE: Duration = Duration::from_millis(500);
 
     /// Takes the layout. Nothing is limited; commands must be renewed every 0.1 s.
     #[must_use]
@@ -82,6 +90,7 @@ impl<K: Kinematics> Chassis<K> {
             command_age_s: f32::MAX,
             is_renewed: false,
             updated: None,
+            unseen_rad: None,
             clock: DeadClock::new(),
             gyro: None,
             reference: Twist::ZERO,
@@ -185,14 +194,13 @@ impl<K: Kinematics> Chassis<K> {
         let dt_s = self.clock.take_step(tick.dt_s());
         self.measure(measured, dt_s);
         let heading = self.odometry.heading();
-        // Updates were left out for so long, and nobody knows when the command came, nor what the wheels did.
-        let is_paused =
-            self.passed(tick.now()).as_secs_f32() - dt_s > self.limits.command_timeout_s();
-        if is_paused {
+        let passed = self.passed(tick.now());
+        if passed > Self::PAUSE {
             self.take_over();
             (self.command_age_s, self.is_renewed) = (f32::MAX, false);
         }
-        let target = self.target(dt_s).to_world(heading);
+        let passed_s = passed.as_secs_f32().max(dt_s);
+        let target = self.target(passed_s).to_world(heading);
         let step_s = if dt_s > Self::MAX_STEP_S { Self::MAX_STEP_S } else { dt_s };
         self.reference = if self.clock.is_dead() {
             Twist::ZERO
@@ -246,13 +254,24 @@ impl<K: Kinematics> Chassis<K> {
         if motion.is_none() || !counted {
             self.status.blind_s = (self.status.blind_s + dt_s).min(f32::MAX);
         }
-        let turned = if counted { self.measured.wz_rad_s * dt_s } else { 0.0 };
         let heading = self.odometry.heading();
-        let expected = before.angle() + Angle::from_radians(turned);
-        let error = math::wrap_pi((heading.angle() - expected).as_radians());
-        if self.odometry.has_gyro() && (!had_gyro || error.abs() > Self::JUMP_RAD) {
+        let turn = math::wrap_pi((heading.angle() - before.angle()).as_radians());
+        let rolled = if counted { self.measured.wz_rad_s * dt_s } else { 0.0 };
+        let is_known =
+            |unseen: &f32| motion.is_some() && counted && unseen.abs() < Self::UNSEEN_RAD;
+        self.unseen_rad = self.unseen_rad.filter(is_known).map(|unseen| unseen + rolled - turn);
+        let has_gyro = self.odometry.has_gyro();
+        let is_back = has_gyro && !had_gyro;
+        let mut jump = if is_back { rolled - turn } else { 0.0 };
+        // A program may give a heading again until the next one comes.
+        if is_back || has_gyro && turn != 0.0 {
+            let unseen = self.unseen_rad.replace(0.0).map_or(0.0, math::wrap_pi);
+            jump = if unseen.abs() > Self::JUMP_RAD && !is_back { unseen } else { jump };
+        }
+        if jump != 0.0 {
             // The heading jumps; the robot does not.
-            self.reference = self.reference.to_body(Heading::new(expected)).to_world(heading);
+            let expected = Heading::new(heading.angle() + Angle::from_radians(jump));
+            self.reference = self.reference.to_body(expected).to_world(heading);
         }
     }
 
@@ -262,9 +281,9 @@ impl<K: Kinematics> Chassis<K> {
         before.map_or(Duration::ZERO, |before| now.since(before))
     }
 
-    fn target(&mut self, dt_s: f32) -> Twist<Body> {
+    fn target(&mut self, passed_s: f32) -> Twist<Body> {
         // The step came before a new command, and after an old command.
-        self.command_age_s = if self.is_renewed { 0.0 } else { self.command_age_s + dt_s };
+        self.command_age_s = if self.is_renewed { 0.0 } else { self.command_age_s + passed_s };
         self.is_renewed = false;
         self.status.command_stale =
             self.clock.is_dead() || self.command_age_s > self.limits.command_timeout_s();
@@ -734,6 +753,15 @@ mod tests {
             chassis.update(NONE, Tick::new(Instant::from_micros(1_000 * ms), 0.4));
             assert!(!chassis.status().command_stale, "steps of a slow program");
         }
+        for turn in 1..99 {
+            chassis.set_body(Twist::new(1.0, 0.0, 0.0));
+            let now = Instant::from_micros(1_203_000 + 125_000 * turn);
+            chassis.update(NONE, Tick::new(now, 0.02));
+            assert!(!chassis.status().command_stale, "a program that limits its steps");
+        }
+        chassis.set_body(Twist::new(1.0, 0.0, 0.0));
+        chassis.update(NONE, Tick::new(Instant::from_micros(20_000_000), 6.4));
+        assert_eq!((chassis.reference(), chassis.status().command_stale), (Twist::ZERO, true));
     }
 
     #[test]
@@ -778,6 +806,45 @@ mod tests {
                 last = chassis.reference();
             }
             assert!((last.vx_m_s - 1.5).abs() < 1e-3, "{last:?}");
+        }
+    }
+
+    #[test]
+    fn a_chassis_that_spins_keeps_its_way_with_headings_of_any_rate() {
+        let limits = ChassisLimits::new().with_acceleration(3.0, 30.0);
+        for (wz, period_ms, lost) in [
+            (15.0, 20, 0),
+            (11.0, 20, 0),
+            (15.0, 10, 7),
+            (15.0, 5, 0),
+            (15.0, 1, 0),
+            (-12.0, 50, 0),
+        ] {
+            for repeats in [true, false] {
+                let mut chassis = limited(limits);
+                let (mut truth, mut given) = (0.0_f32, 0.0_f32);
+                let mut wheels = MecanumWheels::splat(Some(AngularVelocity::ZERO));
+                for ms in 0..3_000 {
+                    truth = wrap_pi(truth + 0.001 * chassis.reference().wz_rad_s);
+                    let is_heard = ms % period_ms == 0 && (lost == 0 || ms / period_ms % lost != 0);
+                    given = if is_heard { truth } else { given };
+                    let heading = Heading::new(Angle::from_radians(given));
+                    let twist = Twist::new(1.0, 0.0, wz);
+                    if repeats {
+                        chassis.set_world(twist, heading);
+                    } else {
+                        if is_heard {
+                            chassis.set_heading(heading);
+                        }
+                        chassis.set_body(twist.to_body(facing(chassis.pose().angle.as_degrees())));
+                    }
+                    wheels = chassis.update(wheels, TICK).map(Some);
+                    let way =
+                        chassis.reference().to_world(facing(chassis.pose().angle.as_degrees()));
+                    let ahead = if ms < 500 { 1.0 } else { way.vx_m_s };
+                    assert!(ahead > 0.9, "{wz} rad/s, each {period_ms} ms, tick {ms}: {way:?}");
+                }
+            }
         }
     }
 
@@ -870,7 +937,7 @@ mod tests {
         chassis.update(NONE, TICK);
         chassis.lock();
         assert_eq!(chassis.update(NONE, TICK), MecanumWheels::splat(AngularVelocity::ZERO));
-        assert_eq!(size_of::<Chassis<Mecanum>>(), 184); // steering costs them nothing
+        assert_eq!(size_of::<Chassis<Mecanum>>(), 192); // steering costs them nothing
     }
 
     const CORNERS: [Vec2; 4] =

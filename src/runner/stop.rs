@@ -78,7 +78,7 @@ impl WatchedStop {
         self.stop.is_some_and(|stop| stop.is_set() || stop.sets() != self.seen)
     }
 
-    /// Tells a tick whether the stop is set, or was since the tick before.
+    /// Tells whether the stop is set, or was since the last call: the caller then stops its device.
     pub(super) fn take(&mut self) -> bool {
         let is_set = self.is_set();
         if let (true, Some(stop)) = (is_set, self.stop) {
@@ -87,10 +87,8 @@ impl WatchedStop {
         is_set
     }
 
-    /// Clears the stop. If the device is stopped, a stop since the last tick is cleared too; otherwise the next tick takes it.
-    pub(super) fn clear(&mut self, is_stopped: bool) {
+    pub(super) fn clear(&self) {
         if let Some(stop) = self.stop {
-            self.seen = if is_stopped { stop.sets() } else { self.seen };
             stop.clear();
         }
     }

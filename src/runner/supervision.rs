@@ -88,10 +88,13 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         self.device.is_armed()
     }
 
-    /// Clears the watched emergency stop and the stop of the device. The device stays disarmed. While the device is not
-    /// stopped, a stop set since the last tick acts in the next tick all the same.
+    /// Clears the watched emergency stop and the stop of the device. The device stays disarmed; a stop that no tick has seen disarms the
+    /// device first.
     pub fn clear_emergency_stop(&mut self) {
-        self.stop.clear(self.device.is_stopped());
+        if self.stop.take() {
+            self.device.emergency_stop();
+        }
+        self.stop.clear();
         self.device.clear_emergency_stop();
     }
 

@@ -123,6 +123,7 @@ impl Loader {
             (Ok(chambers), true) => self.counted = self.counted.before(chambers, self.chambers),
             _ => (self.home, self.counted) = (Some(position), Chamber::FIRST),
         }
+        self.turned_rad = -self.way_rad(position, self.counted);
     }
 
     /// Sets how often a jam of one shot may be tried to clear.
@@ -167,11 +168,18 @@ impl Loader {
             (self.back, self.tries) = (None, 0);
         }
         let way = self.way_rad(position, self.ahead(self.waiting));
+        let is_on = way < -LOST_SHARE * pitch && way > -2.0 * LOST_SHARE * pitch;
+        if !self.is_feeding() && is_on {
+            // It rolled on, or a hand turns it: no shot of an order.
+            self.start(position);
+            return (Feed::Idle, counted);
+        }
         if self.is_lost(way / pitch) {
             return (Feed::Lost, counted);
         }
         if !self.is_feeding() {
-            (self.turned_rad, self.stood_s) = (0.0, 0.0);
+            // The part of a chamber that is begun counts for the next shot.
+            (self.turned_rad, self.stood_s) = (-way, 0.0);
             return (Feed::Idle, counted);
         }
         if let Some((left_s, from)) = self.back {
@@ -299,6 +307,41 @@ mod tests {
         assert!(is_fault && way < 1.6, "{way} chambers");
         let (way, is_fault) = turned(|is| (is.min(20.0), 1.0));
         assert!(is_fault && way < 1.6, "{way} chambers");
+    }
+
+    #[test]
+    fn a_shot_that_completes_a_chamber_ends_before_a_second_one_too() {
+        for begun in [0.0, 0.3, 0.5, 0.85, 0.89] {
+            for idle in [false, true] {
+                let mut loader = Loader::new(8, 3);
+                loader.start(at(0.0, 0.0).0);
+                let from = begun * 45.0;
+                loader.start(at(from, 0.0).0);
+                if idle {
+                    assert_eq!(loader.step(at(from, 0.0), RATES, 0.001), (Feed::Idle, 0));
+                }
+                loader.admit();
+                // Its position stands, its velocity does not.
+                let mut way = begun;
+                while let (Feed::Forward(rate), _) = loader.step(at(from, 5.0), RATES, 0.001) {
+                    way += 0.001 * 5.0_f32.to_degrees() / 45.0;
+                    assert!(rate > 0.0 && way < 1.6, "{begun}: {way} chambers");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_loader_that_rolls_on_without_an_order_goes_on_from_there() {
+        let mut loader = Loader::new(8, 3);
+        loader.start(at(0.0, 0.0).0);
+        for degrees in 0..200_u8 {
+            let rolled = at(f32::from(degrees), 3.0);
+            assert_eq!(loader.step(rolled, RATES, 0.001), (Feed::Idle, 0));
+        }
+        loader.admit();
+        assert!(matches!(loader.step(at(199.0, 0.0), RATES, 0.001), (Feed::Forward(_), 0)));
+        assert_eq!(loader.step(at(221.0, 0.0), RATES, 0.001), (Feed::Idle, 1));
     }
 
     #[test]

@@ -21,6 +21,7 @@ const LONGEST_STEP_S: f32 = 0.1;
 /// | feedback of the loader | example | the shooter stops |
 /// |---|---|---|
 /// | position or velocity is NaN or infinite | | at once |
+/// | position and velocity stand | a frozen sensor | as by a jam |
 /// | the goal lies further away than the shots to come and a chamber, or a chamber back | `set_present_position`, a drive that counts anew | at once |
 /// | by its velocity, the loader has turned by one and a half chambers since the last count | a smaller jump, a position that stands | at most half a chamber late |
 ///

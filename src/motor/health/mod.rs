@@ -20,7 +20,7 @@
 //! | duplicate id | each frame, after a second of too many frames | |
 //!
 //! An [`Actuator`](super::Actuator) and a motor without CAN are checked in each of their updates for errors, and each 8.2 ms
-//! for the rest: motors whose ids differ in the lower three bits in different ticks.
+//! for the rest: once armed, motors whose ids differ in the lower three bits in different milliseconds.
 
 mod config;
 mod edge;

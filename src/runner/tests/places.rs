@@ -140,3 +140,28 @@ fn a_stop_that_is_cleared_before_the_tick_stops_and_needs_a_clear_of_each_runner
     one.tick(Tick::new(at_ms(4), 0.001));
     assert!(one.device().is_stopped(), "set again after the tick before");
 }
+
+#[test]
+fn a_clear_stops_each_part_first_where_no_tick_has_seen_the_stop() {
+    static STOP: EmergencyStop = EmergencyStop::new();
+    let clock = Cell::new(Instant::from_micros(1_000));
+    let (mut front, mut rear) = (Bus::new(), Bus::new());
+    _ = front.attach(Config::<M3508>::at_once(1)).unwrap();
+    let wheel = rear.attach(Config::<M3508>::at_once(5)).unwrap();
+    let runner = Runner::new(Nb(Scripted::default()), &clock, (front, rear));
+    let mut runner = runner.with_emergency_stop(&STOP);
+    for id in [0x201, 0x205] {
+        assert_eq!(runner.ingest(&frame(id, [0; 8]), clock.get()), Ingest::Taken);
+    }
+    runner.arm(Tick::new(clock.get(), 0.001)).unwrap();
+    runner.tick(Tick::new(clock.get(), 0.001));
+    runner.device_mut().1.set_raw(wheel, 50).unwrap();
+    // The program stops one bus, a person both, and the program clears what it stopped.
+    runner.device_mut().0.emergency_stop();
+    STOP.set();
+    runner.clear_emergency_stop();
+    runner.port_mut().0.offered.clear();
+    runner.tick(Tick::new(Instant::from_micros(2_000), 0.001));
+    assert!(runner.port_mut().0.offered.iter().all(|frame| *frame.bytes() == [0; 8]));
+    assert!(!runner.device_mut().1.is_armed() && !runner.device_mut().1.is_stopped());
+}
