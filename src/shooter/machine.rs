@@ -186,7 +186,7 @@ impl Shooter {
     /// While the robot is disarmed, all motors stand and no shot waits. If the time step is not a positive number up to 0.1 s, all motors
     /// stand for that tick, and nothing else changes.
     ///
-    /// Costs 351 instructions on a Cortex-M4F (`docs/figures.md`).
+    /// Costs 356 instructions on a Cortex-M4F (`docs/figures.md`).
     pub fn update(
         &mut self,
         order: ShooterOrder,
