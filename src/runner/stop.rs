@@ -62,35 +62,31 @@ impl EmergencyStop {
 /// The stop of a runner, with the number of its sets until the last tick.
 #[derive(Debug)]
 pub(super) struct WatchedStop {
-    stop: Option<&'static EmergencyStop>,
+    stop: &'static EmergencyStop,
     seen: u32,
 }
 
 impl WatchedStop {
-    pub(super) const NONE: Self = Self { stop: None, seen: 0 };
-
     pub(super) fn new(stop: &'static EmergencyStop) -> Self {
-        Self { stop: Some(stop), seen: stop.sets() }
+        Self { stop, seen: stop.sets() }
     }
 
     /// Tells whether the stop is set, or was since the last tick.
     pub(super) fn is_set(&self) -> bool {
-        self.stop.is_some_and(|stop| stop.is_set() || stop.sets() != self.seen)
+        self.stop.is_set() || self.stop.sets() != self.seen
     }
 
     /// Tells whether the stop is set, or was since the last call: the caller then stops its device.
     pub(super) fn take(&mut self) -> bool {
         let is_set = self.is_set();
-        if let (true, Some(stop)) = (is_set, self.stop) {
-            self.seen = stop.sets();
+        if is_set {
+            self.seen = self.stop.sets();
         }
         is_set
     }
 
     pub(super) fn clear(&self) {
-        if let Some(stop) = self.stop {
-            stop.clear();
-        }
+        self.stop.clear();
     }
 }
 

@@ -62,7 +62,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// Watches an emergency stop: see [`EmergencyStop`].
     #[must_use]
     pub fn with_emergency_stop(mut self, stop: &'static EmergencyStop) -> Self {
-        self.stop = WatchedStop::new(stop);
+        self.stop = Some(WatchedStop::new(stop));
         self
     }
 
@@ -72,7 +72,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// Names the reason, as [`Devices::arm`]; also a watched emergency stop, and a driver that takes no frames. If motors are
     /// missing on a full bus, the error has the [measured load](Self::measured_load). A refused call counts as a request.
     pub fn arm(&mut self, tick: Tick) -> Result<(), ArmError> {
-        let is_stopped = self.stop.is_set();
+        let is_stopped = self.stop.as_ref().is_some_and(WatchedStop::is_set);
         let Some(refusal) = ArmError::around(is_stopped, self.is_bus_down()) else {
             let outcome = self.device.arm(tick.now());
             return outcome.map_err(|refusal| refusal.on_bus(self.meter.last()));
@@ -91,10 +91,12 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// Clears the watched emergency stop and the stop of the device. The device stays disarmed; a stop that no tick has seen disarms the
     /// device first.
     pub fn clear_emergency_stop(&mut self) {
-        if self.stop.take() {
-            self.device.emergency_stop();
+        if let Some(stop) = &mut self.stop {
+            if stop.take() {
+                self.device.emergency_stop();
+            }
+            stop.clear();
         }
-        self.stop.clear();
         self.device.clear_emergency_stop();
     }
 
