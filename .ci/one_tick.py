@@ -54,7 +54,7 @@ def calls(profile, root):
         number, _, rest = text.partition(" ")
         return names.setdefault((table, number), rest)
 
-    home = place = function = callee = None
+    home = place = callee = None
     is_call = False
     for line in profile.splitlines():
         kind, _, text = line.partition("=")
@@ -63,8 +63,7 @@ def calls(profile, root):
         elif kind in ("fi", "fe"):
             place = name("file", text)
         elif kind == "fn":
-            function, place = name("function", text), home
-            homes[function] = home
+            homes[name("function", text)] = place = home
         elif kind in ("cfi", "cfl"):
             name("file", text)
         elif kind == "cfn":

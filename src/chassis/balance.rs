@@ -436,7 +436,7 @@ mod tests {
         Attitude { rotation, rates: [AngularVelocity::ZERO; 3] }
     }
 
-    /// Upright for so many ms, with legs of that length that push with that force.
+    /// Holds the robot upright for some milliseconds, on legs of a given length and force.
     fn upright(robot: &mut Balancer, ms: u32, length_m: f32, force_n: f32) -> [LegEffort; 2] {
         let mut efforts = [LegEffort::default(); 2];
         for _ in 0..ms {

@@ -108,7 +108,7 @@ use crate::geometry::{Twist, World};
 use crate::motor::TargetError;
 use crate::units::AngularVelocity;
 
-/// For so long a command drives that nobody renews, unless the application sets another time.
+/// The time for which a command drives without a renewal, unless the application sets another time.
 const COMMAND_TIMEOUT_S: f32 = 0.1;
 /// The longest time for which a command may drive: the deadline of a motor's target, which the chassis renews in each tick.
 const MAX_COMMAND_TIMEOUT_S: f32 = 1.0;

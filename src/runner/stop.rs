@@ -42,8 +42,8 @@ impl EmergencyStop {
         self.is_set.store(true, Ordering::Release);
     }
 
-    /// Clears the stop alone. A program calls [`Runner::clear_emergency_stop`](super::Runner::clear_emergency_stop) instead: what a runner
-    /// has stopped stays stopped until then.
+    /// Clears the stop alone: the motors of a runner stay stopped. A program calls
+    /// [`Runner::clear_emergency_stop`](super::Runner::clear_emergency_stop) instead.
     pub fn clear(&self) {
         self.is_set.store(false, Ordering::Release);
     }
