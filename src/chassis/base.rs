@@ -4,7 +4,7 @@ use crate::error::ConfigError;
 use crate::geometry::{Body, Heading, Pose2, Twist, World};
 use crate::math;
 use crate::motor::TargetError;
-use crate::time::{Duration, Instant, Tick};
+use crate::time::{Instant, Tick};
 use crate::units::Angle;
 
 /// A chassis of any layout: commands in, wheel speeds out, pose kept.
@@ -70,14 +70,14 @@ impl<K: Kinematics> Chassis<K> {
     /// The longest step in seconds that counts in full for the acceleration limit.
     pub const MAX_STEP_S: f32 = 0.1;
 
-    /// No chassis turns so far against its wheels from one heading of a gyroscope to the next: 11°.
+    /// The largest turn of a chassis against its wheels between two headings of a gyroscope: 11°.
     const JUMP_RAD: f32 = 0.2;
 
-    /// Wheels that turn so far beside one heading slip, or the heading is an old one.
+    /// The largest turn of the wheels beside one heading: after a larger turn the wheels slip, or the heading is old.
     const UNSEEN_RAD: f32 = 1.0;
 
-    /// Nobody knows what wheels did, and when a command came, in a pause of so long.
-    const PAUSE: Duration = Duration::from_millis(500);
+    /// The longest pause between two updates after which the motion of the wheels and the age of a command are known.
+    const PAUSE_S: f32 = 0.5;
 
     /// Takes the layout. Nothing is limited; commands must be renewed every 0.1 s.
     #[must_use]
@@ -194,13 +194,12 @@ impl<K: Kinematics> Chassis<K> {
         let dt_s = self.clock.take_step(tick.dt_s());
         self.measure(measured, dt_s);
         let heading = self.odometry.heading();
-        let passed = self.passed(tick.now());
-        if passed > Self::PAUSE {
+        let passed_s = self.passed_s(tick.now());
+        if passed_s > Self::PAUSE_S {
             self.take_over();
             (self.command_age_s, self.is_renewed) = (f32::MAX, false);
         }
-        let passed_s = passed.as_secs_f32().max(dt_s);
-        let target = self.target(passed_s).to_world(heading);
+        let target = self.target(if passed_s > dt_s { passed_s } else { dt_s }).to_world(heading);
         let step_s = if dt_s > Self::MAX_STEP_S { Self::MAX_STEP_S } else { dt_s };
         self.reference = if self.clock.is_dead() {
             Twist::ZERO
@@ -253,32 +252,42 @@ impl<K: Kinematics> Chassis<K> {
         let counted = self.odometry.advance(self.measured, self.gyro.take(), dt_s);
         if motion.is_none() || !counted {
             self.status.blind_s = (self.status.blind_s + dt_s).min(f32::MAX);
+            self.unseen_rad = None;
         }
-        let heading = self.odometry.heading();
-        let turn = math::wrap_pi((heading.angle() - before.angle()).as_radians());
         let rolled = if counted { self.measured.wz_rad_s * dt_s } else { 0.0 };
-        let is_known =
-            |unseen: &f32| motion.is_some() && counted && unseen.abs() < Self::UNSEEN_RAD;
-        self.unseen_rad = self.unseen_rad.filter(is_known).map(|unseen| unseen + rolled - turn);
-        let has_gyro = self.odometry.has_gyro();
-        let is_back = has_gyro && !had_gyro;
-        let mut jump = if is_back { rolled - turn } else { 0.0 };
-        // A program may give a heading again until the next one comes.
-        if is_back || has_gyro && turn != 0.0 {
-            let unseen = self.unseen_rad.replace(0.0).map_or(0.0, math::wrap_pi);
-            jump = if unseen.abs() > Self::JUMP_RAD && !is_back { unseen } else { jump };
-        }
+        let jump = self.heading_jump(before, had_gyro, rolled);
         if jump != 0.0 {
             // The heading jumps; the robot does not.
+            let heading = self.odometry.heading();
             let expected = Heading::new(heading.angle() + Angle::from_radians(jump));
             self.reference = self.reference.to_body(expected).to_world(heading);
         }
     }
 
-    /// Returns the time since the update before.
-    fn passed(&mut self, now: Instant) -> Duration {
+    /// Returns by how much the wheels turned further than the heading, in rad, if the heading jumped; otherwise 0. `rolled` is the turn of
+    /// the wheels since the heading `before`.
+    fn heading_jump(&mut self, before: Heading, had_gyro: bool, rolled: f32) -> f32 {
+        let turn = math::wrap_pi((self.odometry.heading().angle() - before.angle()).as_radians());
+        let unseen = self.unseen_rad.filter(|unseen| unseen.abs() < Self::UNSEEN_RAD);
+        self.unseen_rad = unseen.map(|unseen| unseen + rolled - turn);
+        match (self.odometry.has_gyro(), had_gyro) {
+            (true, false) => {
+                self.unseen_rad = Some(0.0);
+                rolled - turn
+            }
+            // A program may give a heading again until the next one comes.
+            (true, true) if turn != 0.0 => {
+                let unseen = self.unseen_rad.replace(0.0).map_or(0.0, math::wrap_pi);
+                if unseen.abs() > Self::JUMP_RAD { unseen } else { 0.0 }
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// Returns the time since the update before; 0 in the first.
+    fn passed_s(&mut self, now: Instant) -> f32 {
         let before = self.updated.replace(now);
-        before.map_or(Duration::ZERO, |before| now.since(before))
+        before.map_or(0.0, |before| now.since(before).as_secs_f32())
     }
 
     fn target(&mut self, passed_s: f32) -> Twist<Body> {

@@ -168,9 +168,9 @@ impl Loader {
             (self.back, self.tries) = (None, 0);
         }
         let way = self.way_rad(position, self.ahead(self.waiting));
-        let is_on = way < -LOST_SHARE * pitch && way > -2.0 * LOST_SHARE * pitch;
-        if !self.is_feeding() && is_on {
-            // It rolled on, or a hand turns it: no shot of an order.
+        let has_rolled_on = way < -LOST_SHARE * pitch && way > -2.0 * LOST_SHARE * pitch;
+        if !self.is_feeding() && has_rolled_on {
+            // By itself, or by hand: no shot of an order.
             self.start(position);
             return (Feed::Idle, counted);
         }
@@ -273,7 +273,8 @@ mod tests {
         assert_eq!(loader.step(at(51.0, 0.0), RATES, 0.001), (Feed::Forward(5.0), 0));
     }
 
-    /// The true way in chambers until the loader stops in a fault, or after 20 s: one shot of it, with what position and velocity are of each.
+    /// Returns the true way of one shot in chambers, and whether the shot ended in a fault within 20 s. From the true angle in degrees,
+    /// `reported` makes the angle and the share of the velocity that the loader reports.
     fn turned(reported: impl Fn(f32) -> (f32, f32)) -> (f32, bool) {
         let mut loader = Loader::new(8, 3);
         loader.start(at(0.0, 0.0).0);
