@@ -10,7 +10,7 @@ use super::slot::health::CheckRound;
 use super::slot::{Slot, Surroundings, gap, health};
 use super::{CommandFrame, Feedback};
 use crate::frame::CanFrame;
-use crate::motor::{Condition, Hold, Ingest, MotorName, Rival};
+use crate::motor::{Condition, Hold, Ingest, MotorName};
 use crate::time::{Edge, Instant};
 
 /// Takes any frame.
@@ -147,7 +147,7 @@ pub(super) fn check<const N: usize>(motors: &mut Motors<N>, index: u8, word: i16
         word,
         window: motors.round.window(),
         feedback_hz: motors.round.feedback_hz,
-        is_alone: Rival::is_gone(now, motors.round.rival_heard),
+        is_alone: motors.guard.is_alone(),
     };
     motors.change(index, motors.guard.updated(), |slot| health::check(slot, &seen));
 }
@@ -158,7 +158,7 @@ fn hear_command<const N: usize>(motors: &mut Motors<N>, outbox: &Outbox, id: u32
     if motors.round.echoes || !outbox.is_in_use(frame) {
         return;
     }
-    motors.round.rival_heard = now.stamp();
+    motors.guard.hear_rival(now.stamp());
     motors.change_all(now, |slot| {
         if slot.facts().is_some() && slot.place.frame() == frame {
             health::hear_rival(slot);

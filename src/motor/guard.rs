@@ -3,7 +3,7 @@
 use super::age;
 use super::safety::{DeviceGuard, MotorGuard, OPENING};
 use crate::math::limited;
-use crate::motor::{Link, TargetError, Timeouts};
+use crate::motor::{Condition, Link, TargetError, Timeouts};
 use crate::time::{Duration, Instant};
 
 /// After a silence of so long a drive may have started again, in µs.
@@ -112,13 +112,24 @@ impl Guard {
     }
 
     /// Tells whether a drive may have started again without feedback for so long. Feedback that is late only after more is polled seldom.
-    pub(crate) const fn is_silence(&self, gap_us: u32) -> bool {
-        gap_us > SILENCE_US && gap_us > self.device.timeouts().late_us()
+    pub(crate) fn is_silence(&self, gap_us: u32) -> bool {
+        let timeouts = self.device.timeouts();
+        gap_us > timeouts.late_us() && gap_us > timeouts.offline_us().min(SILENCE_US)
     }
 
-    /// Tells whether a motor without feedback for so long is offline, though no update noticed that.
-    pub(crate) const fn is_offline_by(&self, gap_us: u32) -> bool {
-        gap_us > self.device.timeouts().offline_us()
+    /// Notes that the angle counts from an unknown zero, and [trips](Self::relax_until_armed).
+    pub(crate) fn lose_zero(&mut self, now: Instant) {
+        self.change(now, |motor| {
+            motor.latch_mut().set(Condition::PositionUncertain, true);
+            motor.trip();
+        });
+    }
+
+    /// Notes a command of the motor by another node.
+    pub(super) fn hear_rival(&mut self, now: Instant) {
+        self.device.hear_rival(now.stamp());
+        self.change(now, |motor| motor.latch_mut().set(Condition::SecondMaster, true));
+        self.device.wake_at(self.device.updated());
     }
 
     /// Changes the motor, and notes the consequences.
@@ -162,11 +173,15 @@ impl Guard {
         if self.device.pass(motors, before, true, u32::MAX).is_err() {
             return false;
         }
-        self.change(now, |motor| {
-            // The range of a motor that is not driven must be open before its stamp repeats.
-            motor.share(now.stamp());
-            motor.end_what_is_over();
-        });
+        // The range of a motor that is not driven must be open before its stamp repeats.
+        self.motor.share(now.stamp());
+        if !self.motor.latch().active().is_empty() {
+            let is_alone = self.device.is_alone();
+            self.change(now, |motor| motor.end_what_is_over(is_alone));
+        }
+        if self.motor.latch().has(Condition::SecondMaster) {
+            self.device.wake_at(now);
+        }
         true
     }
 
@@ -183,7 +198,7 @@ impl Guard {
     /// Tells whether the time of the last update moved on. If not, the length of nothing that lasts until now is known.
     #[cfg(feature = "hal")]
     pub(crate) const fn knows_time(&self) -> bool {
-        !self.motor.latch().has(super::Condition::ClockFault)
+        !self.motor.latch().has(Condition::ClockFault)
     }
 
     /// Handles a time that did not move on, so that no age is known. Feedback counts as late until the next frame, and the motor trips.
@@ -364,7 +379,7 @@ impl Guard {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motor::{Condition, MotorName};
+    use crate::motor::MotorName;
 
     fn at_ms(ms: u64) -> Instant {
         Instant::START + Duration::from_millis(ms)

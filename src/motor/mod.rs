@@ -90,7 +90,7 @@ pub use guard::Guard;
 pub(crate) use guard::furthest;
 pub use health::{Condition, Conditions, Health, HealthConfig, Reaction};
 pub(crate) use health::{
-    Journal, Latch, Monitor, Rival, Sample, Severity, Traffic, check_soft_limits, elapsed,
+    Journal, Latch, Monitor, Sample, Severity, Traffic, check_soft_limits, elapsed,
 };
 pub use homing::{HomingStep, StopHoming};
 pub use link::{Link, Timeouts};

@@ -1,8 +1,8 @@
 //! Health of one motor outside of a bus: its vitals, their checks, and its conditions.
 
 use super::{
-    Condition, Conditions, Guard, Health, HealthConfig, Latch, Link, Monitor, MotorName, Rival,
-    Sample, Severity, Traffic, elapsed,
+    Condition, Conditions, Guard, Health, HealthConfig, Latch, Link, Monitor, MotorName, Sample,
+    Severity, Traffic, elapsed,
 };
 use crate::time::{Duration, Edge, Instant};
 
@@ -23,7 +23,6 @@ pub(crate) struct Watch {
     monitor: Monitor,
     traffic: Traffic,
     window_from: Instant,
-    rival: Rival,
     saturated: u16,
     error_code: u8,
     checked: Instant,
@@ -42,7 +41,6 @@ impl Watch {
             monitor: Monitor::NEW,
             traffic: Traffic::NONE,
             window_from: Instant::START,
-            rival: Rival::NONE,
             saturated: 0,
             error_code: 0,
             checked: Instant::START,
@@ -83,15 +81,13 @@ impl Watch {
         self.next
     }
 
-    /// Notes a command frame of another node.
-    pub(crate) fn hear_rival(&mut self, now: Instant) {
+    /// Notes a command of another node, which relaxes the motor where a second master demands rest.
+    pub(crate) fn hear_rival(&self, guard: &mut Guard, now: Instant) {
+        let before = guard.conditions();
         if !self.config.ignores(Condition::SecondMaster) {
-            self.rival.hear(now);
+            guard.note(Condition::SecondMaster, true, now);
         }
-    }
-
-    pub(crate) const fn has_rival(&self) -> bool {
-        self.rival.is_present()
+        self.react(guard, before);
     }
 
     /// Tells whether the motor must not be armed.
@@ -119,7 +115,7 @@ impl Watch {
             (self.checked, self.next) = (now, self.after(now));
         }
         let Vitals { has_fault, has_warning, .. } = vitals();
-        let is_well = !(has_fault || has_warning || self.rival.is_present())
+        let is_well = !(has_fault || has_warning)
             && guard.link() == Link::Online
             && guard.conditions().is_empty();
         if is_well && now < self.next {
@@ -149,24 +145,25 @@ impl Watch {
         now: Instant,
     ) -> f32 {
         let before = guard.conditions();
-        self.rival.check(now);
-        let has_rival = self.has_rival();
         if guard.link() != Link::Online {
             self.monitor = Monitor::NEW;
-            guard.note(Condition::SecondMaster, has_rival, now);
         } else {
             guard.latch(now, |latch| {
-                latch.set(Condition::SecondMaster, has_rival);
                 self.read_error(latch, vitals);
                 if let Some(sample) = slow {
                     self.share = self.monitor.check(latch, sample, self.config);
                 }
             });
         }
+        self.react(guard, before);
+        self.share
+    }
+
+    /// Relaxes the motor if its configuration says so.
+    fn react(&self, guard: &mut Guard, before: Conditions) {
         if self.config.relaxes(before, guard.conditions()) {
             guard.relax_until_armed();
         }
-        self.share
     }
 
     /// Returns the slow quantities, if their check is due.
@@ -271,8 +268,12 @@ impl Vitals {
 impl Guard {
     /// Sets whether a condition of the motor holds. A change is an edge, latched until read.
     ///
-    /// The guard itself notes late and lost feedback and old targets.
+    /// The guard itself notes late and lost feedback and old targets. A second master, noted with each of its commands, is gone in the first
+    /// update more than a second after the last.
     pub fn note(&mut self, condition: Condition, holds: bool, now: Instant) {
+        if condition == Condition::SecondMaster && holds {
+            return self.hear_rival(now);
+        }
         self.latch(now, |latch| latch.set(condition, holds));
     }
 
@@ -353,6 +354,21 @@ mod tests {
         assert_eq!(of(Vitals::of_errors([0, 7, 9], 3)), (true, false, 7));
         assert_eq!(of(Vitals::of_errors([0, 0], 3)), (false, true, 3));
         assert_eq!(of(Vitals::of_errors([0, 0], 0)), (false, false, 0));
+    }
+
+    #[test]
+    fn a_second_master_counts_for_a_second_on_both_sides_of_its_last_command() {
+        let at_ms = |ms: u64| Instant::from_micros(ms * 1_000);
+        for (now_ms, is_present) in [(2_500, true), (4_500, true), (2_499, false), (4_501, false)] {
+            let mut guard = Guard::new();
+            _ = guard.drives(at_ms(1));
+            for at in [1_000, 3_500] {
+                guard.note(Condition::SecondMaster, true, at_ms(at));
+            }
+            _ = guard.drives(at_ms(now_ms));
+            let holds = guard.conditions().contains(Condition::SecondMaster);
+            assert_eq!(holds, is_present, "{now_ms} ms");
+        }
     }
 
     #[test]

@@ -1,10 +1,10 @@
 use super::model::{Budget, Counters, IDS, SLOTS, limited, name};
 use super::schedule::{self, Answers, count};
-use super::slot::{Slot, health};
+use super::slot::Slot;
 use super::{AttachError, Command, Config, Joint, Joints, Register, State};
 use crate::frame::CanFrame;
 use crate::motor::{
-    BusLoad, DeviceGuard, Guard, Hold, Ingest, Link, MotorGuard, MotorName, Timeouts,
+    BusLoad, Condition, DeviceGuard, Guard, Hold, Ingest, Link, MotorGuard, MotorName, Timeouts,
 };
 use crate::time::{Duration, Instant, Tick, TimeStep};
 use embedded_can::Frame;
@@ -153,7 +153,7 @@ impl Joints {
                     return Ingest::Unrelated;
                 }
                 count(&mut counters.foreign_commands);
-                health::hear_rival(slot, now);
+                slot.guard.note(Condition::SecondMaster, true, now);
             }
             None => count(match frame.length() {
                 6 => &mut counters.bad_field,

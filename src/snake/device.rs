@@ -1,6 +1,6 @@
 //! The joints as a device of the runner.
 
-use super::slot::{Slot, health};
+use super::slot::Slot;
 use super::{Joints, schedule};
 use crate::frame::CanFrame;
 use crate::motor::{
@@ -60,7 +60,10 @@ impl CanDevice for Joints {
     }
 
     fn second_master(&self) -> Option<Claim> {
-        let slot = self.slots.iter().find(|slot| health::has_rival(slot))?;
+        let slot = self
+            .slots
+            .iter()
+            .find(|slot| slot.guard.conditions().contains(Condition::SecondMaster))?;
         let id = StandardId::new(u16::from(slot.id?))?;
         Some(Claim::command(id, slot.name()?))
     }

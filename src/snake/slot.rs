@@ -6,7 +6,7 @@ use super::config::{Settings, Stall};
 use super::model::{FASTEST, PULSES_PER_TURN, name};
 use super::{AttachError, Command, Config, Register};
 use crate::encoder::Homing;
-use crate::motor::{Condition, Guard, Link, MotorName, Rival, Timeouts, Traffic};
+use crate::motor::{Condition, Guard, Link, MotorName, Timeouts, Traffic};
 use crate::time::{Duration, Instant};
 use core::f32::consts::TAU;
 
@@ -83,8 +83,6 @@ pub(super) struct Slot {
     resets: u16,
     traffic: Traffic,
     window_from: Instant,
-    /// Time of the last write or request of another node.
-    rival: Rival,
     stall: Stall,
     stands: Standing,
 }
@@ -126,7 +124,6 @@ impl Slot {
         resets: 0,
         traffic: Traffic::NONE,
         window_from: Instant::START,
-        rival: Rival::NONE,
         stall: Stall::USUAL,
         stands: Standing { at: 0, since: Instant::START },
     };

@@ -191,7 +191,7 @@ const WHOLE_WORDS: [&str; 9] =
     ["armed", "lose", "slew", "stop", "stopped", "stops", "timeout", "timeouts", "watchdog"];
 
 /// Names with such a word, by folder: what they are.
-const OWN_NAMES: [(&str, &str, &[&str]); 26] = [
+const OWN_NAMES: [(&str, &str, &[&str]); 25] = [
     ("damiao", "the register of the id of feedback", &["master_id", "with_master_id"]),
     ("damiao", "the time-out of the drive, a setting", &["timeout", "with_timeout"]),
     ("damiao", "an error of the drive", &["CommunicationLost"]),
@@ -218,7 +218,6 @@ const OWN_NAMES: [(&str, &str, &[&str]); 26] = [
         "the core is asked for each motor",
         &["begin_opening", "hear_rival", "keep_trip_of_others", "rival_among", "take_edge"],
     ),
-    ("dji", "the time of a command of another node, which the core compares", &["rival_heard"]),
     ("dji", "the integral within the share that the core leaves", &["hold_back", "opened_part"]),
     ("dji", "a command frame is opened for a motor", &["open"]),
     ("lk", "a count of commands: see above", &["SILENT", "silent"]),
@@ -255,11 +254,7 @@ const OWN_NAMES: [(&str, &str, &[&str]); 26] = [
         "calls of the application, which the core answers",
         &["is_joint_armed", "next_edge", "next_edge_at", "with_timeouts"],
     ),
-    (
-        "snake",
-        "the core is asked for each joint",
-        &["foreign_commands", "has_rival", "hear_rival", "hold", "rival"],
-    ),
+    ("snake", "the core is asked for each joint", &["foreign_commands", "hold"]),
     ("snake", "the time of the last position", &["heard"]),
     ("snake", "a drive in an unexpected state has lost its zero", &["lose_zero"]),
     (

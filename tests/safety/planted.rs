@@ -17,7 +17,7 @@
 //! | opening | after a pause the beginning may lie ahead (was in the crate) | guard without feedback | 3420 |
 //! | opening | a driven drive has no output in one update of seven (in the subject `Damiao`) | damiao, MIT | 780 |
 //! | opening | once driven and once at rest, a drive has no output again (in the subject `Damiao`) | damiao, MIT | all: never driven again |
-//! | second master | the window has 1.05 s (`Rival`) | dji | 3300 |
+//! | second master | the window has 1.05 s (`RIVAL_US`) | dji | 3300 |
 //! | second master | its claim is named for ever (`Actuator::second_master`) | dji and own | 120 |
 //! | second master | a command of other motors counts (`dji::watch::hear_command`) | dji | 120 |
 //! | second master | a frame ahead of the update is one of long ago (was in the crate) | dji | 2940 |

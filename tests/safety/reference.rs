@@ -242,9 +242,6 @@ impl Reference {
     /// Returns the output of the motor if it is driven in this update.
     pub(super) fn update(&mut self, now: u64, has_step: bool) -> Option<Bounds> {
         self.edges.begin_call();
-        if self.rules.rivals == Rivals::AtUpdate {
-            self.look_for_rival(now);
-        }
         let is_shielded = self.rules.bad_step == BadStep::RepeatsThenRelaxes;
         let device_before = self.device_updated.replace(now);
         let device_moves_on = device_before.is_none_or(|before| before < now);
@@ -281,9 +278,6 @@ impl Reference {
             }
         }
         self.is_seen = device_moves_on;
-        if self.rules.rivals == Rivals::AtFrame && device_moves_on {
-            self.look_for_rival(now);
-        }
         if core::mem::take(&mut self.arms_with_update) {
             if !self.tripped || self.is_granted {
                 self.engage(now);
@@ -379,6 +373,7 @@ impl Reference {
             self.edges.set(Condition::CommandLost, false, now);
         }
         self.edges.set(Condition::ClockFault, false, now);
+        self.look_for_rival(now);
     }
 
     /// A bus looks at one motor in each update.
@@ -387,7 +382,6 @@ impl Reference {
         self.steps += 1;
         if is_its_turn {
             self.end_what_is_over(now);
-            self.look_for_rival(now);
             if self.link == Link::Online {
                 self.share = self.opening.share(now);
             }

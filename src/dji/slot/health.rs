@@ -22,7 +22,6 @@ pub(in crate::dji) struct Surroundings {
     /// Length of the counting window in units of 1.024 ms, if the window ends.
     pub(in crate::dji) window: Option<u16>,
     pub(in crate::dji) feedback_hz: u32,
-    /// Whether no other node sends commands any more.
     pub(in crate::dji) is_alone: bool,
 }
 
@@ -31,8 +30,6 @@ pub(in crate::dji) struct Surroundings {
 pub(in crate::dji) struct CheckRound {
     /// Begin of the present counting window.
     window_from: u32,
-    /// Time of the last command frame of another node.
-    pub(in crate::dji) rival_heard: u32,
     /// Begin of the present round.
     begun: u32,
     /// The rate of each motor's feedback, as configured.
@@ -51,7 +48,6 @@ pub(in crate::dji) struct CheckRound {
 impl CheckRound {
     pub(in crate::dji) const NEW: Self = Self {
         window_from: 0,
-        rival_heard: 0,
         begun: 0,
         feedback_hz: 1_000,
         window: 0,
@@ -115,7 +111,7 @@ pub(in crate::dji) fn check(slot: &mut Slot, seen: &Surroundings) {
         close_window(slot, window, seen.feedback_hz);
     }
     if !before.is_empty() {
-        end_what_is_over(slot, seen);
+        slot.guard.end_what_is_over(seen.is_alone);
     }
     if slot.guard.link() == Link::Online {
         let share = run_checks(slot, facts, seen);
@@ -260,13 +256,6 @@ fn soft_limits(slot: &mut Slot, ahead: u8) -> (bool, bool) {
     // The position at the next check.
     let there = here + slot.velocity().as_rad_per_s() * (f32::from(ahead) * 1.024e-3);
     check_soft_limits(slot.guard.latch_mut(), (lower, upper), here, there)
-}
-
-fn end_what_is_over(slot: &mut Slot, seen: &Surroundings) {
-    slot.guard.end_what_is_over();
-    if seen.is_alone {
-        slot.guard.latch_mut().set(Condition::SecondMaster, false);
-    }
 }
 
 fn close_window(slot: &mut Slot, window: u16, feedback_hz: u32) {

@@ -113,7 +113,7 @@ impl<M: DriveProtocol> CanDevice for Actuator<M> {
     }
 
     fn second_master(&self) -> Option<Claim> {
-        self.rival.filter(|_| self.watch.has_rival())
+        self.rival.filter(|_| self.guard.conditions().contains(Condition::SecondMaster))
     }
 
     fn next_edge(&mut self) -> Option<Edge<Condition, MotorName>> {

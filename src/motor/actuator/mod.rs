@@ -193,7 +193,7 @@ impl<M: DriveProtocol> Actuator<M> {
     /// then moves back as after arming.
     ///
     /// A drive without [`Capability::AbsoluteAngle`] counts from another angle when it has lost its supply. Once no feedback was taken for
-    /// 100 ms, or for longer where it is late only then, or an angle is further away than the shaft turned since the feedback before, the
+    /// 100 ms, for less where it is offline sooner, for longer where it is late only then, or an angle is further away than the shaft turned since the feedback before, the
     /// zero is lost. The motor trips, the joint has no angle, and targets with an angle are refused as [`TargetError::NotHomed`], until
     /// this is called again. A joint that was never given a zero counts as its drive, and has none to lose.
     ///

@@ -5,9 +5,7 @@ use super::power::Reading;
 use super::{Actuator, DriveProtocol, INQUIRY, Impedance, Target};
 use crate::frame::CanFrame;
 use crate::motor::guard::SILENCE_US;
-use crate::motor::{
-    Capability, Claim, Condition, Ingest, Link, Repeat, Route, TargetError, Vitals,
-};
+use crate::motor::{Capability, Claim, Ingest, Link, Repeat, Route, TargetError, Vitals};
 use crate::time::{Instant, TimeStep};
 use crate::units::Angle;
 use embedded_can::Frame;
@@ -64,7 +62,7 @@ impl<M: DriveProtocol> Actuator<M> {
         let reading = self.motor.angle().map(|angle| Reading { angle, velocity, at });
         match self.joint.follow(reading, at, gap_us, is_silence) {
             None => {
-                self.guard.note(Condition::PositionUncertain, true, now);
+                self.guard.lose_zero(now);
                 self.fail(now);
             }
             Some(turns) if turns.as_radians() != 0.0 => {
@@ -102,7 +100,7 @@ impl<M: DriveProtocol> Actuator<M> {
         let command = self.motor.claims().into_iter().find(is_its);
         if command.is_some() {
             self.rival = command;
-            self.watch.hear_rival(now);
+            self.watch.hear_rival(&mut self.guard, now);
             self.is_steady = false;
         }
     }

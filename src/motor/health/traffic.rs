@@ -1,6 +1,5 @@
-//! Statistics of the frames of a motor, and frames of a second master.
+//! Statistics of the frames of a motor.
 
-use crate::motor::is_near;
 use crate::time::{Duration, Instant};
 
 /// Gaps are kept in units of 16 µs, up to a second.
@@ -129,37 +128,6 @@ const fn saturated(value: u32) -> u16 {
     if value < u16::MAX as u32 { value as u16 } else { u16::MAX }
 }
 
-/// Another node that sends commands: the time of its last frame.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Rival(Option<Instant>);
-
-impl Rival {
-    /// Time after the last frame from which the node counts as gone.
-    const FORGOTTEN_US: u32 = 1_000_000;
-    const FORGOTTEN: Duration = Duration::from_micros(Self::FORGOTTEN_US as u64);
-
-    pub(crate) const NONE: Self = Self(None);
-
-    pub(crate) const fn hear(&mut self, now: Instant) {
-        self.0 = Some(now);
-    }
-
-    /// Forgets a node that has fallen silent. A frame further ahead was heard before the clock was set back: its age is unknown.
-    pub(crate) fn check(&mut self, now: Instant) {
-        let is_near = |heard: &Instant| now.since(*heard).max(heard.since(now)) <= Self::FORGOTTEN;
-        self.0 = self.0.filter(is_near);
-    }
-
-    /// Tells whether the node of a frame heard at a stamp has fallen silent. A stamp may lie a little ahead of `now`.
-    pub(crate) const fn is_gone(now: u32, heard: u32) -> bool {
-        !is_near(now, heard, Self::FORGOTTEN_US)
-    }
-
-    pub(crate) const fn is_present(self) -> bool {
-        self.0.is_some()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -235,17 +203,6 @@ mod tests {
                 gap_ms = 0;
             }
             prop_assert!(!traffic.is_double());
-        }
-    }
-
-    #[test]
-    fn a_frame_counts_for_a_second_on_both_sides_of_it() {
-        let at_ms = |ms: u64| Instant::START + Duration::from_millis(ms);
-        for (now_ms, is_present) in [(2_500, true), (4_500, true), (2_499, false), (4_501, false)] {
-            let mut rival = Rival::NONE;
-            rival.hear(at_ms(3_500));
-            rival.check(at_ms(now_ms));
-            assert_eq!(rival.is_present(), is_present, "{now_ms} ms");
         }
     }
 }

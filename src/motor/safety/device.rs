@@ -1,7 +1,7 @@
 //! Rules shared by the motors of a device: time, the request to arm, the emergency stop.
 
-use super::LONGEST_PAUSE_US;
 use super::motor::{Guarded, MotorGuard};
+use super::{Hold, LONGEST_PAUSE_US, RIVAL_US};
 use crate::motor::{Journal, Link, Timeouts, age, is_near};
 use crate::time::{Duration, Instant};
 
@@ -25,18 +25,9 @@ pub(crate) struct DeviceGuard<const N: usize> {
     is_stopped: bool,
     /// Updates in a row without a usable step.
     held_steps: u8,
+    /// Stamp of the last command of another node.
+    rival_heard: u32,
     journal: Journal<N>,
-}
-
-/// Output of an update without a usable step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Hold {
-    /// Keep the last commands.
-    Keep,
-    /// Send zeros.
-    Rest,
-    /// Send zeros: time did not move on, and all motors are relaxed until armed again.
-    LoseTime,
 }
 
 impl<const N: usize> DeviceGuard<N> {
@@ -50,6 +41,7 @@ impl<const N: usize> DeviceGuard<N> {
         is_running: false,
         is_stopped: false,
         held_steps: 0,
+        rival_heard: 0,
         journal: Journal::EMPTY,
     };
 
@@ -267,6 +259,16 @@ impl<const N: usize> DeviceGuard<N> {
     /// Returns the number of updates in a row without a usable time or step.
     pub(crate) const fn held_steps(&self) -> u8 {
         self.held_steps
+    }
+
+    /// Notes a command of another node: the motors of the command have a [second master](crate::motor::Condition::SecondMaster).
+    pub(crate) const fn hear_rival(&mut self, now: u32) {
+        self.rival_heard = now;
+    }
+
+    /// Tells whether no other node has sent a command for a second.
+    pub(crate) const fn is_alone(&self) -> bool {
+        !is_near(self.now, self.rival_heard, RIVAL_US)
     }
 
     // Arming.

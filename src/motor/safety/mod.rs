@@ -12,7 +12,8 @@
 //! | is there a target that is not expired? | `MotorGuard::age` | relaxed |
 //! | how far is the output range open? | `MotorGuard::share` | that share of the full command |
 //!
-//! The [health](super::HealthConfig) of a family finds faults, a second master, heat and a stall. Each acts by [`MotorGuard::trip`]. The tables
+//! The [health](super::HealthConfig) of a family finds faults, heat and a stall, and [`DeviceGuard::is_alone`] ends a second master. Each
+//! acts by [`MotorGuard::trip`]. The tables
 //! of links and of arming, with all transitions, stand in the documentation of [`motor`](super#states).
 //!
 //! Times of a motor are stamps of 32 bits. Ages of several motors are compared together: no motor is checked again before the
@@ -23,7 +24,7 @@ mod motor;
 
 use crate::time::Duration;
 
-pub(crate) use device::{DeviceGuard, Hold};
+pub(crate) use device::DeviceGuard;
 pub(crate) use motor::{Guarded, MotorGuard};
 
 /// Default time in which the output range of a motor opens after arming: 0.2 s.
@@ -49,6 +50,17 @@ pub(crate) enum Rest {
     Pause,
     /// There was no target: the loops start afresh.
     Relaxed,
+}
+
+/// Output of an update without a usable step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Hold {
+    /// Keep the last commands.
+    Keep,
+    /// Send zeros.
+    Rest,
+    /// Send zeros: time did not move on, and all motors are relaxed until armed again.
+    LoseTime,
 }
 
 /// Whether an update without a usable step may repeat the last command: the first after a command, and no other.
@@ -79,6 +91,9 @@ impl Repeat {
         self.0 &= has_target;
     }
 }
+
+/// Time after the last command of another node from which there is no second master.
+const RIVAL_US: u32 = 1_000_000;
 
 /// Longest pause between two checks for which a 32-bit stamp still represents an age.
 const LONGEST_PAUSE_US: u32 = 60_000_000;

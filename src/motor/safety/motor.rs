@@ -230,7 +230,7 @@ impl MotorGuard {
         self.link = Link::Late;
         self.in_time &= COUNT;
         self.latch.set(Condition::Late, true);
-        self.interrupt();
+        self.rest = self.rest.max(Rest::Pause);
     }
 
     /// Handles a lost motor: relaxes, and refuses targets until armed again or, if configured, until recovered.
@@ -263,12 +263,15 @@ impl MotorGuard {
         }
     }
 
-    /// Ends the conditions that an update with a step ends.
-    pub(crate) const fn end_what_is_over(&mut self) {
+    /// Ends the conditions that an update with a step ends; a second master if no other node [commands](super::DeviceGuard::is_alone) the device.
+    pub(crate) const fn end_what_is_over(&mut self, is_alone: bool) {
         if self.has_target {
             self.latch.set(Condition::CommandLost, false);
         }
         self.latch.set(Condition::ClockFault, false);
+        if is_alone {
+            self.latch.set(Condition::SecondMaster, false);
+        }
     }
 
     /// Tells whether a new target may be taken.
@@ -294,14 +297,10 @@ impl MotorGuard {
             Arming::Armed => {
                 // A pause is enough, without a reset of the loops: a late motor is soon offline.
                 self.has_target = false;
-                self.interrupt();
+                self.rest = self.rest.max(Rest::Pause);
                 TargetError::NoFeedback
             }
         }
-    }
-
-    fn interrupt(&mut self) {
-        self.rest = self.rest.max(Rest::Pause);
     }
 
     /// Sets a target.

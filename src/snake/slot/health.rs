@@ -48,10 +48,8 @@ impl Slot {
         self.was_led = is_up(self);
         measure_rate(self, raw, now);
         if !self.guard.hear_in_time(now) {
-            let is_lost = self.guard.is_silence(gap_us) || self.guard.is_offline_by(gap_us);
-            if was_heard && is_lost {
+            if was_heard && self.guard.is_silence(gap_us) {
                 self.lose_zero(now);
-                self.guard.relax_until_armed();
             }
             match self.raw {
                 Some(_) => self.traffic.gap(gap_us),
@@ -73,7 +71,7 @@ impl Slot {
     }
 
     fn lose_zero(&mut self, now: Instant) {
-        self.guard.note(Condition::PositionUncertain, true, now);
+        self.guard.lose_zero(now);
         if self.homing == Homing::Homed {
             self.homing = Homing::Uncertain;
         }
@@ -147,26 +145,11 @@ fn measure_rate(slot: &mut Slot, raw: i32, now: Instant) {
     }
 }
 
-/// Notes a write or a request of another node.
-pub(in crate::snake) fn hear_rival(slot: &mut Slot, now: Instant) {
-    slot.rival.hear(now);
-    slot.guard.note(Condition::SecondMaster, true, now);
-    slot.guard.wake_at(now);
-}
-
-pub(in crate::snake) const fn has_rival(slot: &Slot) -> bool {
-    slot.rival.is_present()
-}
-
 /// Begins and ends conditions, and ends the window in which positions are counted. The next check is due at the end of the window, and
 /// during a condition with the next update.
 fn check(slot: &mut Slot, is_stalled: bool, now: Instant) {
     if slot.guard.link() == Link::Offline {
         slot.lose_zero(now);
-    }
-    if has_rival(slot) {
-        slot.rival.check(now);
-        slot.guard.note(Condition::SecondMaster, has_rival(slot), now);
     }
     if is_stalled && slot.stall.reaction == Reaction::Relax {
         slot.guard.relax_until_armed();
@@ -179,8 +162,7 @@ fn check(slot: &mut Slot, is_stalled: bool, now: Instant) {
     if slot.traffic.end_window(&mut slot.window_from, now) {
         slot.guard.trust(0);
     }
-    let is_well = !is_stalled && !has_rival(slot);
-    slot.guard.wake_at(if is_well { slot.window_from + Traffic::WINDOW } else { now });
+    slot.guard.wake_at(if is_stalled { now } else { slot.window_from + Traffic::WINDOW });
 }
 
 /// Tells whether a joint away from its target stands for too long: the joint is blocked, or its drive does not follow.

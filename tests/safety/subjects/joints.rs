@@ -25,7 +25,7 @@ impl Subject<1> for Snake {
         bad_step: BadStep::RepeatsThenRelaxes,
         loses_zero: true,
         opens: Opens::Never,
-        rivals: Rivals::AtFrame,
+        rivals: Rivals::Reported,
         ..OWN
     }];
 

@@ -76,10 +76,9 @@ const BUS: Rules = Rules {
     opens: Opens::Clamps,
     opens_again: false,
     resolution: 1e-4,
-    rivals: Rivals::AtTurn,
+    rivals: Rivals::Configured,
 };
-const OWN: Rules =
-    Rules { bad_step: BadStep::Ages, arms_again: false, room: 6, rivals: Rivals::AtUpdate, ..BUS };
+const OWN: Rules = Rules { bad_step: BadStep::Ages, arms_again: false, room: 6, ..BUS };
 const ACTUATOR: Rules = Rules { opens_again: true, ..OWN };
 /// A drive whose own loop follows the target, with the resolution of its frames.
 const PREPARED: Rules = Rules { is_prepared: true, resolution: 0.013, ..ACTUATOR };
