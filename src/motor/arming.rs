@@ -3,6 +3,7 @@
 #[cfg(feature = "hal")]
 use super::Guard;
 use super::{BusLoad, Claim, MotorName};
+use crate::time::{Duration, Instant, Tick};
 
 /// The motors that prevent arming, by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -282,42 +283,73 @@ impl core::fmt::Display for WrongSetting {
 
 /// The switch by which a person arms a robot: only its turn from off to on does.
 ///
-/// The position is unknown while a remote control is not heard. A switch that is on at power-on, after the reset of a watchdog, or when
-/// the remote control is heard again, arms nothing until it was off.
+/// The position is unknown while a remote control is not heard. A robot that was on [brakes](SwitchOrder::Brake) then for a second, and is
+/// disarmed: a stop of category 1 in IEC 60204-1, where a robot that is disarmed at once rolls on for metres. A switch that is on at
+/// power-on, after the reset of a watchdog, or when the remote control is heard again, arms nothing until it was off.
 ///
 /// # Examples
 /// ```
 /// use drivetrain::motor::{ArmingSwitch, SwitchOrder};
+/// use drivetrain::time::{Instant, Tick};
 ///
+/// let at_ms = |ms: u64| Tick::new(Instant::from_micros(ms * 1_000), 0.001);
 /// let mut switch = ArmingSwitch::new();
-/// assert_eq!(switch.read(Some(true)), SwitchOrder::Keep); // on at power-on: disarmed, as it was
-/// assert_eq!(switch.read(Some(false)), SwitchOrder::Disarm);
-/// assert_eq!(switch.read(Some(true)), SwitchOrder::Arm);
-/// assert_eq!(switch.read(None), SwitchOrder::Disarm); // not heard
-/// assert_eq!(switch.read(Some(true)), SwitchOrder::Keep); // heard again, and nobody has turned the switch
+/// assert_eq!(switch.read(Some(true), at_ms(1)), SwitchOrder::Keep); // on at power-on: disarmed, as it was
+/// assert_eq!(switch.read(Some(false), at_ms(2)), SwitchOrder::Disarm);
+/// assert_eq!(switch.read(Some(true), at_ms(3)), SwitchOrder::Arm);
+/// assert_eq!(switch.read(None, at_ms(4)), SwitchOrder::Brake); // not heard
+/// assert_eq!(switch.read(Some(true), at_ms(1_003)), SwitchOrder::Brake); // heard again, and nobody has turned the switch
+/// assert_eq!(switch.read(Some(true), at_ms(1_004)), SwitchOrder::Disarm);
+/// assert_eq!(switch.read(Some(true), at_ms(1_005)), SwitchOrder::Keep);
 /// ```
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ArmingSwitch {
-    was_off: bool,
+    position: SwitchPosition,
+}
+
+/// The position of a switch, as far as it counts.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+enum SwitchPosition {
+    /// Not known, or on without a turn.
+    #[default]
+    Unknown,
+    Off,
+    /// Turned on.
+    On,
+    /// Not known from this time on, and turned on before.
+    Lost(Instant),
 }
 
 impl ArmingSwitch {
+    /// How long a robot brakes before it is disarmed.
+    const BRAKING: Duration = Duration::from_secs(1);
+
     /// Makes a switch whose position was not read yet.
     #[must_use]
     pub const fn new() -> Self {
-        Self { was_off: false }
+        Self { position: SwitchPosition::Unknown }
     }
 
     /// Takes the position, on or off, and `None` while it is not known: once a tick.
     #[must_use]
-    pub const fn read(&mut self, is_on: Option<bool>) -> SwitchOrder {
-        let was_off = core::mem::replace(&mut self.was_off, matches!(is_on, Some(false)));
-        match is_on {
-            Some(true) if was_off => SwitchOrder::Arm,
-            Some(true) => SwitchOrder::Keep,
-            Some(false) | None => SwitchOrder::Disarm,
-        }
+    pub fn read(&mut self, is_on: Option<bool>, tick: Tick) -> SwitchOrder {
+        let now = tick.now();
+        let (position, order) = match (self.position, is_on) {
+            (_, Some(false)) => (SwitchPosition::Off, SwitchOrder::Disarm),
+            (SwitchPosition::Off, Some(true)) => (SwitchPosition::On, SwitchOrder::Arm),
+            (SwitchPosition::Unknown | SwitchPosition::On, Some(true)) => {
+                (self.position, SwitchOrder::Keep)
+            }
+            (SwitchPosition::On, None) => (SwitchPosition::Lost(now), SwitchOrder::Brake),
+            (SwitchPosition::Lost(from), _) if now.since(from) < Self::BRAKING => {
+                (self.position, SwitchOrder::Brake)
+            }
+            _ => (SwitchPosition::Unknown, SwitchOrder::Disarm),
+        };
+        self.position = position;
+        order
     }
 }
 
@@ -325,11 +357,13 @@ impl ArmingSwitch {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SwitchOrder {
-    /// The switch was turned on just now.
+    /// The switch was turned on just now. With a stick that is held, a program does not arm: the robot would leap.
     Arm,
     /// The switch is on as before: armed motors stay armed, and others disarmed.
     Keep,
-    /// The switch is off, or its position is not known.
+    /// The position of a switch that was on is not known: armed motors stay armed, and get the targets of a robot that stands.
+    Brake,
+    /// The switch is off, or its position was not known for a second.
     Disarm,
 }
 

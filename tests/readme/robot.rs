@@ -20,6 +20,7 @@ trait Pilot {
     fn twist(&self) -> Twist<World>; // m/s and rad/s, in the world's frame
     fn heading(&self) -> Heading; // from the IMU
     fn offer(&mut self, frame: &CanFrame); // a frame that is no motor's
+    fn feed_watchdog(&mut self); // a time-out of some ticks: a loop that hangs leaves the motors their last command
     fn report(&mut self, why: ArmError); // "no feedback from M3508 #3"
     fn note(&mut self, change: Edge<Condition, MotorName>); // "M3508 #2: ESC fault began at 10240 us"
 }
@@ -43,25 +44,33 @@ fn robot(
     let fastest = AngularVelocity::from_rpm(450.0);
     let mut runner = Runner::new(Nb(can), clock, bus).with_emergency_stop(&STOP);
     let mut switch = ArmingSwitch::new(); // on at power-on, or after a watchdog's reset, it arms nothing
+    let mut beat = runner.heartbeat();
     loop {
         runner.poll_with(16, |other| pilot.offer(other)); // bounded; foreign frames are yours
         let Some(tick) = runner.due() else { continue }; // 1 kHz on a grid, overruns counted
-        match switch.read(pilot.is_switch_on()) {
+        let mut twist = pilot.twist();
+        match switch.read(pilot.is_switch_on(), tick) {
+            SwitchOrder::Arm if twist != Twist::ZERO => {} // a stick is held: off and on again
             SwitchOrder::Arm => runner.arm(tick).unwrap_or_else(|why| pilot.report(why)),
             SwitchOrder::Keep => {}
+            SwitchOrder::Brake => twist = Twist::ZERO, // for a second, while the remote control is not heard
             SwitchOrder::Disarm => runner.device_mut().disarm(),
         }
         if pilot.clears_stop() {
             runner.clear_emergency_stop(); // then the switch, off and on, arms
         }
         // Armed means all of them: when one wheel is lost for 100 ms, the others stop as well.
-        let wanted = if runner.is_armed() { pilot.twist() } else { Twist::new(0.0, 0.0, 0.0) };
+        let wanted = if runner.is_armed() { twist } else { Twist::ZERO };
         let (speeds, _) = mecanum.inverse(wanted.to_body(pilot.heading())).desaturate(fastest);
         _ = runner.device_mut().drive(wheels.zip(speeds).into_array());
         _ = runner.device_mut().set_angle(yaw, Angle::from_degrees(90.0));
         runner.tick(tick); // update, then send
         while let Some(change) = runner.device_mut().next_edge() {
             pilot.note(change);
+        }
+        if beat != runner.heartbeat() {
+            beat = runner.heartbeat();
+            pilot.feed_watchdog();
         }
     }
 }

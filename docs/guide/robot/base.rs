@@ -108,9 +108,9 @@ pub mod tests {
             world.advance(Duration::from_millis(1));
             runner.poll(16);
             let Some(tick) = runner.due() else { continue };
-            match switch.read(Some(ms >= 100)) {
+            match switch.read(Some(ms >= 100), tick) {
                 SwitchOrder::Arm => runner.arm(tick).unwrap(),
-                SwitchOrder::Keep => {}
+                SwitchOrder::Keep | SwitchOrder::Brake => {}
                 SwitchOrder::Disarm => runner.device_mut().disarm(),
             }
             let left = if (500..2_500).contains(&ms) { 0.5 } else { 0.0 };

@@ -1,6 +1,7 @@
 use crate::robot::Wish;
 use crate::robot::tests::{WISH, motors, robot, run};
 use drivetrain::frame::CanFrame;
+use drivetrain::geometry::Twist;
 use drivetrain::motor::{ArmError, Condition};
 use drivetrain::runner::{BusCondition, EmergencyStop};
 use drivetrain::sim::{Fault, Line, Simulation};
@@ -101,7 +102,8 @@ fn while_a_second_program_commands_the_turret_the_switch_arms_neither_bus() {
     world.inject(Line::Can2, two_amperes).unwrap();
     run(&world, &mut robot, 5, OFF);
     world.advance(Duration::from_millis(1));
-    let refusal = robot.step(&WISH, |_, _| {});
+    let rest = Wish { twist: Twist::ZERO, ..WISH };
+    let refusal = robot.step(&rest, |_, _| {});
     assert!(matches!(refusal, Some(ArmError::SecondMaster(_))), "{refusal:?}");
     assert!(!robot.lower.is_armed()); // both buses, or none
 }

@@ -22,14 +22,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         runner.poll(16); // takes received frames
         let Some(tick) = runner.due() else { continue }; // once a millisecond
 
-        match switch.read(Some((100..1_500).contains(&ms))) {
+        let mut rpm = 100.0;
+        match switch.read(Some((100..1_500).contains(&ms)), tick) {
             SwitchOrder::Arm => runner.arm(tick)?, // turned on just now
             SwitchOrder::Keep => {}
+            SwitchOrder::Brake => rpm = 0.0, // the switch is not heard: disarmed in a second
             SwitchOrder::Disarm => runner.device_mut().disarm(),
         }
 
         // Refused without harm unless the motor is armed.
-        _ = runner.device_mut().set_velocity(wheel, AngularVelocity::from_rpm(100.0));
+        _ = runner.device_mut().set_velocity(wheel, AngularVelocity::from_rpm(rpm));
         runner.tick(tick); // runs the loop and sends the command
 
         let state = runner.device().state(wheel).ok_or("detached")?;

@@ -101,7 +101,7 @@ mod tests {
         let (mut robot, mut pilot) = (robot(&world, &STOP), Pilot::new().unwrap());
         let (mut buffer_j, mut heat, mut hottest, mut energy_j, mut shots) =
             (60.0, 0.0, 0.0_f32, 0.0, 0);
-        for ms in 0..8_600 {
+        for ms in 0..9_400 {
             world.advance(Duration::from_millis(1));
             let now = world.now();
             // The referee system measures, and reports ten times a second: 60 W, a heat limit of 50.
@@ -122,7 +122,8 @@ mod tests {
             if ms % 14 == 0 && !(8_000..8_300).contains(&ms) {
                 let frame = match ms {
                     ..100 => remote(1_024, DOWN, DOWN),
-                    100..2_000 => remote(1_684, UP, MIDDLE),
+                    100..200 => remote(1_024, UP, DOWN),
+                    200..2_000 => remote(1_684, UP, MIDDLE),
                     _ => remote(1_684, UP, UP),
                 };
                 pilot.hear_remote(&frame, now);

@@ -19,6 +19,13 @@ pub struct Wish {
     pub heat: Option<BarrelHeat>,
 }
 
+impl Wish {
+    /// The sticks are let go, and nothing shoots: a robot that is armed otherwise leaps.
+    fn is_at_rest(&self) -> bool {
+        self.twist == Twist::ZERO && self.order == ShooterOrder::Rest
+    }
+}
+
 /// Two buses, each with its runner.
 #[derive(Debug)]
 pub struct Robot<P, K> {
@@ -27,6 +34,7 @@ pub struct Robot<P, K> {
     pub base: Base,
     pub turret: Turret,
     switch: ArmingSwitch,
+    brakes: bool, // the switch is not heard
 }
 
 impl<P: Port, K: Clock + Copy> Robot<P, K> {
@@ -41,7 +49,7 @@ impl<P: Port, K: Clock + Copy> Robot<P, K> {
         let (base, turret) = (Base::new(&mut wheels)?, Turret::new(&mut gimbal)?);
         let lower = Runner::new(lower, clock, wheels).with_emergency_stop(stop);
         let upper = Runner::new(upper, clock, gimbal).with_emergency_stop(stop);
-        Ok(Self { lower, upper, base, turret, switch: ArmingSwitch::new() })
+        Ok(Self { lower, upper, base, turret, switch: ArmingSwitch::new(), brakes: false })
     }
 
     /// Runs the steps that are due. `limit` sees the commands of the wheels before they are sent.
@@ -55,18 +63,23 @@ impl<P: Port, K: Clock + Copy> Robot<P, K> {
         self.upper.poll(16);
         let mut refusal = None;
         if let Some(tick) = self.lower.due() {
-            match self.switch.read(wish.is_on) {
+            let order = self.switch.read(wish.is_on, tick);
+            self.brakes = order == SwitchOrder::Brake;
+            match order {
+                SwitchOrder::Arm if !wish.is_at_rest() => {} // the sticks first
                 SwitchOrder::Arm => refusal = self.arm(tick),
-                SwitchOrder::Keep => {}
+                SwitchOrder::Keep | SwitchOrder::Brake => {}
                 SwitchOrder::Disarm => self.disarm(),
             }
             // Armed means all wheels: when one is lost, the others brake.
-            let twist = if self.lower.is_armed() { wish.twist } else { Twist::ZERO };
+            let drives = self.lower.is_armed() && !self.brakes;
+            let twist = if drives { wish.twist } else { Twist::ZERO };
             self.base.drive(self.lower.device_mut(), twist, tick);
             self.lower.tick_limited(tick, |bus| limit(bus, tick));
         }
         if let Some(tick) = self.upper.due() {
-            self.turret.drive(self.upper.device_mut(), (wish.angle, wish.order, wish.heat), tick);
+            let order = if self.brakes { ShooterOrder::Rest } else { wish.order };
+            self.turret.drive(self.upper.device_mut(), (wish.angle, order, wish.heat), tick);
             self.upper.tick(tick);
         }
         refusal
@@ -125,6 +138,8 @@ pub mod tests {
     pub fn run(world: &Simulation, robot: &mut Simulated<'_>, millis: u32, wish: Wish) {
         for _ in 0..millis {
             world.advance(Duration::from_millis(1));
+            let rest = Wish { twist: Twist::ZERO, order: ShooterOrder::Rest, ..wish };
+            let wish = if robot.lower.is_armed() { wish } else { rest };
             let refusal = robot.step(&wish, |_, _| {});
             assert!(refusal.is_none(), "{refusal:?}");
         }

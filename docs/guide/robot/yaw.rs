@@ -39,9 +39,9 @@ mod tests {
             world.advance(Duration::from_millis(1));
             runner.poll(16);
             let Some(tick) = runner.due() else { continue };
-            match switch.read(Some(ms >= 100)) {
+            match switch.read(Some(ms >= 100), tick) {
                 SwitchOrder::Arm => runner.arm(tick).unwrap(),
-                SwitchOrder::Keep => {}
+                SwitchOrder::Keep | SwitchOrder::Brake => {}
                 SwitchOrder::Disarm => runner.device_mut().disarm(),
             }
             let degrees = if ms < 2_000 { 90.0 } else { 350.0 };

@@ -8,6 +8,8 @@ WATCHDOG_US = 20_000
 # From reset to the first frame: clocks, drivers, the first tick.
 START_US = 4_000
 REMOTE_LOST_US = 100_000 + 14_000 + 10_000
+# A robot whose remote control is lost brakes for so long, and is disarmed then.
+BRAKING_US = 1_000_000
 # A wheel that is slower stands.
 STANDS_RPM = 5
 

@@ -3,10 +3,12 @@ import random
 
 from board.imu import frame
 from robots import ARM_AT_US, CYCLE_US, FAULT_AT_US
-from rows.judge import REMOTE_LOST_US, STANDS_RPM, drives_again, driving, goes_on, must, rested, rests, row
+from rows.judge import BRAKING_US, REMOTE_LOST_US, STANDS_RPM, drives_again, driving, goes_on, must, rested, rests, row
 
 # A chassis of 20 kg brakes from half its speed within 300 ms, and an IMU is lost after 50 ms.
 STOP_US, LOOK_US = 350_000, 5_000
+# After so long the robot without a remote control is disarmed for certain.
+DISARMED_US = REMOTE_LOST_US + BRAKING_US + 20_000
 
 
 @row("F41")
@@ -34,16 +36,15 @@ def remote_cut(robot):
     """The line of the remote control is cut in the middle of a frame."""
     driving(robot)
     robot.remote.cut_after = 7
-    robot.run(FAULT_AT_US + 130_000)
-    zero = robot.zero_after(FAULT_AT_US)
-    must(zero is not None and zero < REMOTE_LOST_US, f"no zeros after {zero} us")
-    rests(robot, FAULT_AT_US + zero + 1, FAULT_AT_US + 130_000)
-    # Heard again with the switch still at the top: nothing moves before it is turned anew.
-    robot.remote.cut_after, robot.remote.is_heard = None, True
-    robot.run(FAULT_AT_US + 180_000)
-    rests(robot, FAULT_AT_US + 140_000, FAULT_AT_US + 180_000)
-    drives_again(robot, FAULT_AT_US + 180_000)
-    return {"zero_us": zero, "stale": len(robot.stale()), "note": "rests when heard again; drives again when armed again"}
+
+    def hear():
+        robot.remote.cut_after, robot.remote.is_heard = None, True
+
+    # Heard again with the switch still at the top and the stick held: nothing moves before it is turned anew.
+    robot.at(FAULT_AT_US + 600_000, hear)
+    result = _without_remote(robot, "brakes, is disarmed a second later; drives again when armed again")
+    drives_again(robot, FAULT_AT_US + DISARMED_US)
+    return result
 
 
 @row("F59", needs="remote")
@@ -51,11 +52,7 @@ def remote_noise(robot):
     """Two bits of each byte of the remote control are inverted: no frame is plausible."""
     driving(robot)
     robot.remote.spoil = lambda place, byte: byte ^ 0x5A if place < 6 else byte
-    robot.run(FAULT_AT_US + 140_000)
-    zero = robot.zero_after(FAULT_AT_US)
-    must(zero is not None and zero < REMOTE_LOST_US, f"no zeros after {zero} us")
-    rests(robot, FAULT_AT_US + zero + 1, FAULT_AT_US + 140_000)
-    return {"zero_us": zero, "stale": len(robot.stale()), "note": "at rest"}
+    return _without_remote(robot, "brakes, is disarmed a second later")
 
 
 @row("F59", needs="remote")
@@ -109,10 +106,7 @@ def remote_storm(robot):
             robot.clock.after(robot.clock.cycles(120), noise)
 
     noise()
-    robot.run(FAULT_AT_US + 140_000)
-    result = rested(robot, FAULT_AT_US, REMOTE_LOST_US, "at rest")
-    rests(robot, FAULT_AT_US + REMOTE_LOST_US, FAULT_AT_US + 140_000)
-    return result
+    return _without_remote(robot, "brakes, is disarmed a second later")
 
 
 @row("F41", "fresh", needs="remote")
@@ -147,7 +141,20 @@ def _fastest_rpm(robot):
     return max(abs(robot.world.state(motor)[0]) for motor in range(4))
 
 
+def _without_remote(robot, note):
+    """The wheels stand in time; a second after the loss the robot is disarmed."""
+    result = _stands(robot, REMOTE_LOST_US + STOP_US, DISARMED_US, note)
+    zero = robot.zero_after(FAULT_AT_US)
+    must(zero is not None and zero < REMOTE_LOST_US + BRAKING_US, f"no zeros after {zero} us")
+    rests(robot, FAULT_AT_US + zero + 1, FAULT_AT_US + DISARMED_US)
+    return result
+
+
 def _without_imu(robot, note):
+    return _stands(robot, STOP_US, 450_000, note)
+
+
+def _stands(robot, limit_us, end_us, note):
     """The wheels stand in time, and stay there."""
     turning = []
 
@@ -155,11 +162,11 @@ def _without_imu(robot, note):
         if _fastest_rpm(robot) >= STANDS_RPM:
             turning.append(robot.clock.us())
 
-    for us in range(0, 450_000, LOOK_US):
+    for us in range(0, end_us, LOOK_US):
         robot.at(FAULT_AT_US + us, look)
-    robot.run(FAULT_AT_US + 450_000)
+    robot.run(FAULT_AT_US + end_us)
     stands_us = turning[-1] + LOOK_US - FAULT_AT_US
-    must(stands_us < STOP_US, f"the wheels turn {stands_us:.0f} us after the IMU was lost")
+    must(stands_us < limit_us, f"the wheels turn {stands_us:.0f} us after the loss")
     must(not robot.resets, "it was reset")
     return {"zero_us": stands_us, "stale": len(robot.stale(FAULT_AT_US)), "note": note}
 

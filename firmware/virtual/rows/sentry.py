@@ -1,9 +1,11 @@
 """The sentry: two buses, a gimbal on an IMU, a shooter."""
 from board.remote import BAUD, DOWN
 from machines import ARM_AT_US, CYCLE_US, FAULT_AT_US, FLYWHEELS, LOADER, PITCH, UP, YAW
-from rows.judge import LOST_US, START_US, WATCHDOG_US, drives_again, figures, must, rests, row, watched
+from rows.judge import BRAKING_US, LOST_US, REMOTE_LOST_US, START_US, WATCHDOG_US, drives_again, figures, must, rests, row, watched
 
 YAW_COMMAND, SHOOTER_COMMAND = 0x1FF, 0x200
+# After so long the sentry without a remote control is disarmed: it brakes before.
+DISARMED_US = REMOTE_LOST_US + BRAKING_US
 
 
 def _driving(robot):
@@ -178,7 +180,10 @@ def sentry_remote_cut(robot):
     """The line of the remote control, which DMA reads, is cut in the middle of a frame."""
     _driving(robot)
     robot.remote.cut_after = 7
-    return _at_rest(robot, FAULT_AT_US, 124_000, "at rest until armed again", FAULT_AT_US + 200_000)
+    robot.run(FAULT_AT_US + REMOTE_LOST_US + 500_000)
+    _, ahead, _, _ = robot.world.pose()
+    must(abs(ahead) < 0.05, f"it drives with {ahead:.2f} m/s half a second after the loss")
+    return _at_rest(robot, FAULT_AT_US, DISARMED_US, "stands, is disarmed a second later, until armed again", FAULT_AT_US + 1_200_000)
 
 
 @row("F59", needs="sentry")
@@ -186,8 +191,8 @@ def sentry_remote_storm(robot):
     """The bytes of the remote control come at twice its rate: the USART reports framing errors, and DMA starts again each time."""
     _driving(robot)
     robot.remote.baud = 200_000
-    heard = FAULT_AT_US + 200_000
-    result = _at_rest(robot, FAULT_AT_US, 124_000, "rests when heard again; drives again when armed again", heard)
+    heard = FAULT_AT_US + 1_200_000
+    result = _at_rest(robot, FAULT_AT_US, DISARMED_US, "rests when heard again; drives again when armed again", heard)
     robot.remote.baud = BAUD
     robot.run(heard + 50_000)
     rests(robot, heard, heard + 50_000)

@@ -13,6 +13,7 @@ use c_board_embassy::{WATCHDOG_US, can1, clocks, now};
 use core::cell::RefCell;
 use defmt_rtt as _;
 use drivetrain::dji::Bus;
+use drivetrain::motor::SwitchOrder;
 use drivetrain::runner::Runner;
 use drivetrain::wire::dbus::Dbus;
 use embassy_executor::Spawner;
@@ -21,7 +22,7 @@ use embassy_stm32::{bind_interrupts, peripherals, wdg::IndependentWatchdog};
 use embassy_sync::blocking_mutex::{Mutex, raw::ThreadModeRawMutex};
 use embassy_time::{Duration, Ticker};
 use embedded_io_async::Read;
-use {{crate_name}}::{Arming, Robot};
+use {{crate_name}}::Robot;
 use panic_probe as _;
 use static_cell::StaticCell;
 
@@ -74,14 +75,14 @@ async fn main(spawner: Spawner) {
         runner.poll(32);
         let Some(tick) = runner.due() else { continue };
         let remote = remotes.lock(|dbus| dbus.borrow_mut().remote(tick.now()));
-        match robot.hear(&remote) {
-            Arming::Arm => {
+        match robot.hear(&remote, tick) {
+            SwitchOrder::Arm => {
                 if let Err(why) = runner.arm(tick) {
                     defmt::warn!("{}", why);
                 }
             }
-            Arming::Keep => {}
-            Arming::Disarm => runner.device_mut().disarm(),
+            SwitchOrder::Keep | SwitchOrder::Brake => {}
+            SwitchOrder::Disarm => runner.device_mut().disarm(),
         }
         robot.drive(runner.device_mut(), &remote, tick);
         runner.tick(tick);

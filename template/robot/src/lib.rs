@@ -5,7 +5,7 @@ use drivetrain::chassis::{Chassis, ChassisLimits, Differential};
 use drivetrain::control::{PidConfig, WheelTuning};
 use drivetrain::dji::{Bus, Config, Handle, M3508, Model};
 use drivetrain::geometry::Twist;
-use drivetrain::motor::Devices;
+use drivetrain::motor::{ArmingSwitch, Devices, SwitchOrder};
 use drivetrain::time::Tick;
 use drivetrain::units::{AngularVelocity, Current};
 use drivetrain::wire::dbus::{Remote, Switch};
@@ -60,17 +60,6 @@ impl Mode {
     }
 }
 
-/// What to do with the motors as a whole, in this tick.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Arming {
-    /// Arm, once: the switch left its rest just now, with both sticks at rest.
-    Arm,
-    /// Leave it as it is.
-    Keep,
-    /// Disarm.
-    Disarm,
-}
-
 /// The robot.
 #[derive(Debug)]
 pub struct Robot {
@@ -78,8 +67,8 @@ pub struct Robot {
     wheels: [Handle<M3508>; 2],
     chassis: Chassis<Differential>,
     mode: Mode,
-    /// Whether the switch was at rest since the robot was switched on, and the remote control was heard.
-    was_at_rest: bool,
+    /// The right switch: on in its middle and at its top.
+    switch: ArmingSwitch,
 }
 
 impl Robot {
@@ -96,29 +85,24 @@ impl Robot {
             .with_acceleration(3.0, 10.0)
             .with_wheel_speed(AngularVelocity::from_rpm(400.0));
         chassis.set_limits(limits).map_err(|_| "a limit is not above zero")?;
-        Ok(Self { wheels, chassis, mode: Mode::Rest, was_at_rest: false })
+        Ok(Self { wheels, chassis, mode: Mode::Rest, switch: ArmingSwitch::new() })
     }
 
-    /// Takes what the remote control shows: once a tick, before [`drive`](Self::drive).
-    pub fn hear(&mut self, remote: &Remote) -> Arming {
-        let before = core::mem::replace(&mut self.mode, remote.right_switch.into());
+    /// Takes what the remote control shows: once a tick, before [`drive`](Self::drive). Arms only with both sticks at rest. When the remote
+    /// control is lost, the robot brakes for a second, and is disarmed.
+    pub fn hear(&mut self, remote: &Remote, tick: Tick) -> SwitchOrder {
+        let is_at_rest = remote.right_switch.is_at(Switch::Down);
+        let order = self.switch.read(is_at_rest.map(|is_at_rest| !is_at_rest), tick);
         let sticks_rest = [remote.right_x, remote.right_y, remote.left_x] == [0.0; 3];
-        match (before, self.mode) {
-            (_, Mode::Rest) => {
-                // Silence is no rest: a remote control that comes back must not arm.
-                self.was_at_rest = remote.right_switch == Switch::Down;
-                Arming::Disarm
-            }
-            (Mode::Rest, _) if self.was_at_rest && sticks_rest => {
+        let brakes = order == SwitchOrder::Brake;
+        self.mode = if brakes { Mode::Rest } else { remote.right_switch.into() };
+        match order {
+            SwitchOrder::Arm if !sticks_rest => SwitchOrder::Keep,
+            SwitchOrder::Arm => {
                 self.chassis.restart();
-                Arming::Arm
+                order
             }
-            (Mode::Rest, _) => {
-                self.mode = Mode::Rest;
-                self.was_at_rest = false;
-                Arming::Disarm
-            }
-            _ => Arming::Keep,
+            _ => order,
         }
     }
 
@@ -139,6 +123,9 @@ impl Robot {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use drivetrain::time::Instant;
+
+    const TICK: Tick = Tick::new(Instant::from_micros(1_000), 0.001);
 
     fn remote(switch: Switch, right_y: f32) -> Remote {
         Remote { right_switch: switch, right_y, ..Remote::default() }
@@ -148,22 +135,22 @@ mod tests {
     fn only_a_switch_that_leaves_its_rest_with_the_sticks_at_rest_arms() {
         use Switch::{Absent, Down, Middle, Up};
         for (positions, expected) in [
-            (&[Down, Up][..], Arming::Arm),
-            (&[Down, Middle], Arming::Arm),
-            (&[Down, Up, Middle], Arming::Keep),
-            (&[Up], Arming::Disarm),
-            (&[Down, Absent, Up], Arming::Disarm),
-            (&[Down, Up, Absent], Arming::Disarm),
+            (&[Down, Up][..], SwitchOrder::Arm),
+            (&[Down, Middle], SwitchOrder::Arm),
+            (&[Down, Up, Middle], SwitchOrder::Keep),
+            (&[Up], SwitchOrder::Keep),
+            (&[Down, Absent, Up], SwitchOrder::Keep),
+            (&[Down, Up, Absent], SwitchOrder::Brake),
+            (&[Down, Up, Absent, Up], SwitchOrder::Brake),
+            (&[Down, Up, Down], SwitchOrder::Disarm),
         ] {
             let mut robot = Robot::new(&mut Bus::new()).unwrap();
-            let mut arming = Arming::Disarm;
-            for switch in positions {
-                arming = robot.hear(&remote(*switch, 0.0));
-            }
-            assert_eq!(arming, expected, "{positions:?}");
+            let orders = positions.iter().map(|switch| robot.hear(&remote(*switch, 0.0), TICK));
+            assert_eq!(orders.last(), Some(expected), "{positions:?}");
         }
         let mut robot = Robot::new(&mut Bus::new()).unwrap();
-        robot.hear(&remote(Down, 0.0));
-        assert_eq!(robot.hear(&remote(Up, 1.0)), Arming::Disarm, "a stick is pushed");
+        _ = robot.hear(&remote(Down, 0.0), TICK);
+        let held = robot.hear(&remote(Up, 1.0), TICK);
+        assert_eq!(held, SwitchOrder::Keep, "a stick is pushed: disarmed as before");
     }
 }

@@ -2,11 +2,12 @@
 
 use drivetrain::dji::Bus;
 use drivetrain::geometry::{Body, Pose2, Twist, Vec2, World};
+use drivetrain::motor::SwitchOrder;
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{ChassisConfig, Fault, MotorConfig, Simulation, Wheel};
 use drivetrain::time::{Duration, Instant};
 use drivetrain::wire::dbus::{Remote, Switch};
-use {{crate_name}}::{Arming, HALF_TRACK_M, MASS_KG, Robot, WHEEL_RADIUS_M};
+use {{crate_name}}::{HALF_TRACK_M, MASS_KG, Robot, WHEEL_RADIUS_M};
 use std::error::Error;
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
@@ -49,10 +50,10 @@ fn drive(
         runner.poll(16);
         let Some(tick) = runner.due() else { continue };
         let remote = pilot(tick.now().as_micros() / 1_000);
-        match robot.hear(&remote) {
-            Arming::Arm => runner.arm(tick)?,
-            Arming::Keep => {}
-            Arming::Disarm => runner.device_mut().disarm(),
+        match robot.hear(&remote, tick) {
+            SwitchOrder::Arm => runner.arm(tick)?,
+            SwitchOrder::Keep | SwitchOrder::Brake => {}
+            SwitchOrder::Disarm => runner.device_mut().disarm(),
         }
         robot.drive(runner.device_mut(), &remote, tick);
         runner.tick(tick);
@@ -76,6 +77,16 @@ fn a_stick_that_is_pushed_for_two_seconds_drives_three_metres() {
     let (fastest, pose, _) = drive(pilot, 3_000, None).unwrap();
     assert!((1.3..1.7).contains(&fastest), "{fastest} m/s");
     assert!((2.0..3.5).contains(&pose.x_m), "{} m", pose.x_m);
+}
+
+#[test]
+fn a_robot_whose_remote_control_is_lost_at_full_speed_stands_within_a_metre() {
+    let lost = |ms| if ms < 2_000 { pilot(ms) } else { Remote::default() };
+    let (_, from, before) = drive(lost, 2_000, None).unwrap();
+    let (_, to, after) = drive(lost, 3_000, None).unwrap();
+    assert!(before.vx_m_s > 1.3, "{before:?}");
+    assert!((0.3..1.0).contains(&(to.x_m - from.x_m)), "{} m", to.x_m - from.x_m);
+    assert!(after.linear().norm() < 0.05, "{after:?}");
 }
 
 /// A braked wheel alone leaves a turn about itself free, which friction ends.

@@ -18,6 +18,7 @@ use c_board_embassy::{WATCHDOG_US, can1, clocks, now};
 use core::cell::RefCell;
 use defmt_rtt as _;
 use drivetrain::dji::Bus;
+use drivetrain::motor::SwitchOrder;
 use drivetrain::runner::Runner;
 use embassy_executor::Spawner;
 use embassy_stm32::usart::{self, BufferedUart, BufferedUartRx, BufferedUartTx, Parity};
@@ -27,7 +28,7 @@ use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Ticker};
 use embedded_io_async::{Read, ReadReady, Write};
 use panic_probe as _;
-use pilot::{CURVES_BYTES, Pilot, Wish};
+use pilot::{CURVES_BYTES, Pilot};
 use static_cell::StaticCell;
 
 bind_interrupts!(struct Interrupts {
@@ -116,14 +117,14 @@ async fn main(spawner: Spawner) {
         let Some(tick) = runner.due() else { continue };
         pilot.lock(|pilot| {
             let mut pilot = pilot.borrow_mut();
-            match pilot.wish(tick.now()) {
-                Wish::Arm => {
+            match pilot.order(tick) {
+                SwitchOrder::Arm => {
                     if let Err(why) = runner.arm(tick) {
                         defmt::warn!("{}", why);
                     }
                 }
-                Wish::GoOn => {}
-                Wish::Rest => runner.device_mut().disarm(),
+                SwitchOrder::Keep | SwitchOrder::Brake => {}
+                SwitchOrder::Disarm => runner.device_mut().disarm(),
             }
             // Read here, because the bus belongs to this loop: the bytes that are there, without waiting for more.
             let mut bytes = [0; 64];

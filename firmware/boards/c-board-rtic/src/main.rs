@@ -68,9 +68,10 @@ mod app {
     use bxcan::{Fifo, Interrupt, Rx0};
     use core::sync::atomic::{AtomicU32, Ordering};
     use drivetrain::dji::Bus;
+    use drivetrain::motor::SwitchOrder;
     use drivetrain::runner::{FrameQueue, FrameReceiver, FrameSender, Nb, NbAbort, Runner};
     use drivetrain::time::{Instant, Tick};
-    use pilot::{Pilot, Wish};
+    use pilot::Pilot;
     use rtic_time::Monotonic;
     use stm32f4xx_hal::can::Can;
     use stm32f4xx_hal::pac::{CAN1, TIM2, USART1, USART3};
@@ -202,14 +203,14 @@ mod app {
             Micros::delay_until(next).await;
             let tick = Tick::new(now(), PERIOD_S);
             (&mut runner, &mut pilot).lock(|runner, pilot| {
-                match pilot.wish(tick.now()) {
-                    Wish::Arm => {
+                match pilot.order(tick) {
+                    SwitchOrder::Arm => {
                         if let Err(why) = runner.arm(tick) {
                             defmt::warn!("{}", why);
                         }
                     }
-                    Wish::GoOn => {}
-                    Wish::Rest => runner.device_mut().disarm(),
+                    SwitchOrder::Keep | SwitchOrder::Brake => {}
+                    SwitchOrder::Disarm => runner.device_mut().disarm(),
                 }
                 pilot.drive(runner.device_mut(), tick);
                 pilot.edges(tick.now(), |who, edge| defmt::warn!("{}: {}", who, edge));

@@ -17,7 +17,7 @@ use core::cell::RefCell;
 use defmt_rtt as _;
 use drivetrain::dji::Bus;
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::Devices;
+use drivetrain::motor::{Devices, SwitchOrder};
 use drivetrain::time::{Duration, Instant, Tick};
 use embassy_executor::Spawner;
 use embassy_stm32::can::{self, BufferedCanReceiver, BufferedCanSender, CanConfigurator};
@@ -29,7 +29,7 @@ use embassy_stm32::{peripherals::IWDG1, wdg::IndependentWatchdog};
 use embassy_sync::blocking_mutex::{Mutex, raw::ThreadModeRawMutex};
 use embedded_io_async::Read;
 use panic_probe as _;
-use pilot::{Pilot, Wish};
+use pilot::Pilot;
 use static_cell::StaticCell;
 
 bind_interrupts!(struct Interrupts {
@@ -105,14 +105,14 @@ async fn control(mut can: BufferedCanSender, robot: &'static Shared, iwdg: Peri<
         before = now;
         robot.lock(|robot| {
             let Robot { bus, pilot } = &mut *robot.borrow_mut();
-            match pilot.wish(tick.now()) {
-                Wish::Arm => {
+            match pilot.order(tick) {
+                SwitchOrder::Arm => {
                     if let Err(why) = bus.arm(tick.now()) {
                         defmt::warn!("{}", why);
                     }
                 }
-                Wish::GoOn => {}
-                Wish::Rest => bus.disarm(),
+                SwitchOrder::Keep | SwitchOrder::Brake => {}
+                SwitchOrder::Disarm => bus.disarm(),
             }
             pilot.drive(bus, tick);
             pilot.edges(tick.now(), |who, edge| defmt::warn!("{}: {}", who, edge));

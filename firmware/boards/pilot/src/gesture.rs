@@ -1,30 +1,19 @@
 //! Who may arm, and when: by a turn of the remote control's right switch, while nothing else asks for a motion.
 
+use drivetrain::motor::{ArmingSwitch, SwitchOrder};
+use drivetrain::time::Tick;
 use drivetrain::wire::dbus::{Remote, Switch};
 
-/// What the remote control asks for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Wish {
-    /// The switch was turned to the top just now.
-    Arm,
-    /// It still is there.
-    GoOn,
-    /// It is not, or the remote control is not heard.
-    Rest,
-}
-
-/// The switch as it was in the cycle before.
+/// The right switch of the remote control: on at the top.
 #[derive(Debug, Default)]
-pub struct Gesture(Switch);
+pub struct Gesture(ArmingSwitch);
 
 impl Gesture {
-    /// Returns what the remote control asks for; to be called once a tick.
-    pub fn wish(&mut self, remote: &Remote) -> Wish {
-        match (core::mem::replace(&mut self.0, remote.right_switch), remote.right_switch) {
-            (Switch::Up, Switch::Up) => Wish::GoOn,
-            // The turn of the switch, not its place: a remote that comes back in range must not start a robot.
-            (Switch::Middle | Switch::Down, Switch::Up) if asks_for_nothing(remote) => Wish::Arm,
-            _ => Wish::Rest,
+    /// Returns what the switch asks for; to be called once a tick. A turn to the top while a stick is held arms nothing.
+    pub fn read(&mut self, remote: &Remote, tick: Tick) -> SwitchOrder {
+        match self.0.read(remote.right_switch.is_at(Switch::Up), tick) {
+            SwitchOrder::Arm if !asks_for_nothing(remote) => SwitchOrder::Keep,
+            order => order,
         }
     }
 }

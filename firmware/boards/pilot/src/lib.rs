@@ -1,8 +1,8 @@
 //! What the boards share: the robots without their boards. Here a DBUS remote control and a HiPNUC IMU drive a mecanum chassis of
 //! four M3508; [`sentry`] and [`snake`] are whole machines.
 //!
-//! Arm: both sticks at rest, the left switch in its middle, turn the right switch from its middle or its bottom to the top. Stop: turn it away, or lose
-//! the remote.
+//! Arm: both sticks at rest, the left switch in its middle, turn the right switch from its middle or its bottom to the top. Stop: turn it
+//! away. When the remote control is lost, the robot brakes for a second, and is disarmed.
 //! The right stick moves the chassis, the left one turns it. With an IMU that is heard, forward is where its yaw is zero;
 //! without one, forward is where the chassis looks. Which of them holds is chosen while both sticks are at rest; when the IMU
 //! falls silent while one is held, the robot stops until both are let go. When a wheel is lost for 100 ms, the others brake until the
@@ -18,13 +18,11 @@ pub mod loader;
 pub mod sentry;
 pub mod snake;
 
-pub use gesture::Wish;
-
 use drivetrain::chassis::{Chassis, ChassisLimits, Mecanum, MecanumWheels};
 use drivetrain::control::{PidConfig, WheelTuning};
 use drivetrain::dji::{Bus, Config, Handle, M3508, Model};
 use drivetrain::geometry::{Heading, Twist, Vec2};
-use drivetrain::motor::Devices;
+use drivetrain::motor::{Devices, SwitchOrder};
 use drivetrain::time::{Duration, Edge, Instant, Tick};
 use drivetrain::units::{AngularVelocity, Current};
 use drivetrain::wire::dbus::{Dbus, Remote};
@@ -87,6 +85,8 @@ pub struct Pilot {
     imu: Receiver<Imu, MAX_FRAME>,
     parameters: Parameters<3>,
     gesture: Gesture,
+    /// The remote control is lost, and the robot is armed for a while.
+    brakes: bool,
     forward: Forward,
 }
 
@@ -97,7 +97,8 @@ impl Pilot {
         let imu = Receiver::new(IMU_DEADLINE);
         let (gesture, forward) = (Gesture::default(), Forward::Chassis);
         let parameters = Parameters::new(PARAMETERS).map_err(|_| "a parameter that cannot work")?;
-        Ok(Self { wheels, chassis, dbus: Dbus::new(), imu, parameters, gesture, forward })
+        let (dbus, brakes) = (Dbus::new(), false);
+        Ok(Self { wheels, chassis, dbus, imu, parameters, gesture, brakes, forward })
     }
 
     /// Takes bytes of the remote control that arrived at `now`.
@@ -156,23 +157,25 @@ impl Pilot {
     }
 
     /// Returns what the remote control asks for; to be called once a tick.
-    pub fn wish(&mut self, now: Instant) -> Wish {
-        let wish = self.gesture.wish(&self.dbus.remote(now));
-        if wish != Wish::Arm {
-            return wish;
+    pub fn order(&mut self, tick: Tick) -> SwitchOrder {
+        let now = tick.now();
+        let order = self.gesture.read(&self.dbus.remote(now), tick);
+        self.brakes = order == SwitchOrder::Brake;
+        if order != SwitchOrder::Arm {
+            return order;
         }
         // A turn of the PC is a stick that is held: arming moves nothing.
         if self.turn_of_pc(now) != 0.0 {
-            return Wish::Rest;
+            return SwitchOrder::Keep;
         }
         self.chassis.restart();
-        wish
+        order
     }
 
     /// Sets the targets of the wheels: zero unless all are armed, so when one is lost for 100 ms, the others brake.
     pub fn drive(&mut self, bus: &mut Bus, tick: Tick) {
         self.steer(&self.dbus.remote(tick.now()), tick.now());
-        if !bus.is_armed() {
+        if !bus.is_armed() || self.brakes {
             self.chassis.set_body(Twist::ZERO);
         }
         self.chassis.drive(bus, self.wheels, tick);
@@ -231,7 +234,7 @@ mod tests {
     use drivetrain::frame::CanFrame;
     use drivetrain::geometry::Body;
     use drivetrain::runner::{Nb, Runner};
-    use drivetrain::sim::{ChassisConfig, Fault, MotorConfig, Simulation, Wheel};
+    use drivetrain::sim::{ChassisConfig, Fault, MotorConfig, MotorKey, Simulation, Wheel};
 
     const UP: u64 = 1;
     const MIDDLE: u64 = 3;
@@ -251,22 +254,22 @@ mod tests {
         frame
     }
 
-    fn wishes(frames: &[[u8; 18]]) -> Wish {
-        wishes_after(b"", frames)
+    fn orders(frames: &[[u8; 18]]) -> SwitchOrder {
+        orders_after(b"", frames)
     }
 
-    /// The last wish, after lines of a PC at 1 ms.
-    fn wishes_after(lines: &[u8], frames: &[[u8; 18]]) -> Wish {
+    /// The last order, after lines of a PC at 1 ms.
+    fn orders_after(lines: &[u8], frames: &[[u8; 18]]) -> SwitchOrder {
         let mut bus = Bus::new();
         let mut pilot = Pilot::new(&mut bus).unwrap();
         pilot.hear_debug_port(&mut bus, lines, Instant::START + Duration::from_millis(1));
-        let mut wish = Wish::Rest;
+        let mut order = SwitchOrder::Disarm;
         for (frame, ms) in frames.iter().zip((14..).step_by(14)) {
             let now = Instant::START + Duration::from_millis(ms);
             pilot.hear_remote(frame, now);
-            wish = pilot.wish(now);
+            order = pilot.order(Tick::new(now, 0.001));
         }
-        wish
+        order
     }
 
     /// As the README has them.
@@ -278,18 +281,25 @@ mod tests {
 
     #[test]
     fn only_turning_the_switch_to_the_top_with_both_sticks_at_rest_arms() {
-        assert_eq!(wishes(&[frame(1024, MIDDLE), frame(1024, UP)]), Wish::Arm);
-        assert_eq!(wishes(&[frame(1024, MIDDLE), frame(1024, UP), frame(1684, UP)]), Wish::GoOn);
-        assert_eq!(wishes(&[frame(1024, MIDDLE), frame(1684, UP)]), Wish::Rest);
-        assert_eq!(wishes(&[frame(1024, UP)]), Wish::Rest, "at power-on");
-        assert_eq!(wishes(&[frame(1024, UP), frame(1024, MIDDLE)]), Wish::Rest);
+        assert_eq!(orders(&[frame(1024, MIDDLE), frame(1024, UP)]), SwitchOrder::Arm);
+        assert_eq!(
+            orders(&[frame(1024, MIDDLE), frame(1024, UP), frame(1684, UP)]),
+            SwitchOrder::Keep
+        );
+        assert_eq!(
+            orders(&[frame(1024, MIDDLE), frame(1684, UP)]),
+            SwitchOrder::Keep,
+            "disarmed as before"
+        );
+        assert_eq!(orders(&[frame(1024, UP)]), SwitchOrder::Keep, "at power-on");
+        assert_eq!(orders(&[frame(1024, UP), frame(1024, MIDDLE)]), SwitchOrder::Disarm);
     }
 
     #[test]
     fn a_turn_of_the_pc_prevents_arming_as_a_stick_that_is_held_does() {
         let turned_up = [frame(1024, 3), frame(1024, 1)];
-        assert_eq!(wishes_after(b"turn=0.5\n", &turned_up), Wish::Rest);
-        assert_eq!(wishes_after(b"turn=0\nwheel_kp=1\n", &turned_up), Wish::Arm);
+        assert_eq!(orders_after(b"turn=0.5\n", &turned_up), SwitchOrder::Keep);
+        assert_eq!(orders_after(b"turn=0\nwheel_kp=1\n", &turned_up), SwitchOrder::Arm);
     }
 
     /// The first word that a wheel at rest is sent for a target of 1 rad/s.
@@ -350,9 +360,8 @@ mod tests {
         assert_eq!(frame[20..], [0, 0, 0x80, 0x7F]);
     }
 
-    /// The motion of the robot at half a stick ahead, and 0.6 s after its front left wheel fell silent.
-    fn motions_with_a_wheel_that_falls_silent() -> [Twist<Body>; 2] {
-        const SILENT_AT_MS: u64 = 2_000;
+    /// The robot on its wheels, and its front left motor.
+    fn on_wheels() -> (Simulation, MotorKey) {
         let world = Simulation::new(1);
         let wheel = |id, x, y| {
             let motor = world.attach(MotorConfig::m3508(id)).unwrap();
@@ -363,8 +372,15 @@ mod tests {
             [wheel(1, 0.2, -0.18), wheel(4, -0.2, -0.18)].map(|(_, wheel)| wheel.reversed());
         let floor = [left[0].1, left[1].1, right[0], right[1]];
         world.attach_chassis(ChassisConfig::new(&floor).with_mass_kg(WHEEL.mass_kg)).unwrap();
+        (world, left[0].0)
+    }
+
+    /// The motion of the robot at half a stick ahead, and 0.6 s after its front left wheel fell silent.
+    fn motions_with_a_wheel_that_falls_silent() -> [Twist<Body>; 2] {
+        const SILENT_AT_MS: u64 = 2_000;
+        let (world, front_left) = on_wheels();
         let at = |ms| Instant::START + Duration::from_millis(ms);
-        world.fault(Fault::Silent(left[0].0), at(SILENT_AT_MS)..at(9_000)).unwrap();
+        world.fault(Fault::Silent(front_left), at(SILENT_AT_MS)..at(9_000)).unwrap();
         let mut bus = Bus::new();
         let mut pilot = Pilot::new(&mut bus).unwrap();
         let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
@@ -379,10 +395,10 @@ mod tests {
                 _ => (HALF, UP),
             };
             pilot.hear_remote(&shown(REST, ahead, switch), tick.now());
-            match pilot.wish(tick.now()) {
-                Wish::Arm => runner.arm(tick).unwrap(),
-                Wish::GoOn => {}
-                Wish::Rest => runner.device_mut().disarm(),
+            match pilot.order(tick) {
+                SwitchOrder::Arm => runner.arm(tick).unwrap(),
+                SwitchOrder::Keep | SwitchOrder::Brake => {}
+                SwitchOrder::Disarm => runner.device_mut().disarm(),
             }
             pilot.drive(runner.device_mut(), tick);
             runner.tick(tick);
@@ -397,6 +413,51 @@ mod tests {
         let [before, after] = motions_with_a_wheel_that_falls_silent();
         assert!((before.vx_m_s - 0.75).abs() < 0.05, "{before:?}");
         assert!(after.linear().norm() < 0.02 && after.wz_rad_s.abs() < 0.02, "{after:?}");
+    }
+
+    #[test]
+    fn a_robot_whose_remote_control_is_lost_brakes_for_a_second_and_is_disarmed() {
+        let (world, _) = on_wheels();
+        let mut bus = Bus::new();
+        let mut pilot = Pilot::new(&mut bus).unwrap();
+        let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
+        let mut way = [0.0; 2];
+        for ms in 1..4_000 {
+            world.advance(Duration::from_millis(1));
+            runner.poll(16);
+            let Some(tick) = runner.due() else { continue };
+            // Heard again with the switch at the top and the stick held, 0.5 s after the loss.
+            if !(2_000..2_500).contains(&ms) {
+                let (ahead, switch) = if ms < 200 {
+                    (REST, MIDDLE)
+                } else {
+                    (if ms < 500 { REST } else { HALF }, UP)
+                };
+                pilot.hear_remote(&shown(REST, ahead, switch), tick.now());
+            }
+            let order = pilot.order(tick);
+            match order {
+                SwitchOrder::Arm => runner.arm(tick).unwrap(),
+                SwitchOrder::Keep | SwitchOrder::Brake => {}
+                SwitchOrder::Disarm => runner.device_mut().disarm(),
+            }
+            assert_eq!(
+                order == SwitchOrder::Brake,
+                (2_100..3_100).contains(&ms),
+                "{ms} ms: {order:?}"
+            );
+            pilot.drive(runner.device_mut(), tick);
+            runner.tick(tick);
+            let (pose, motion) = world.chassis().unwrap();
+            match ms {
+                2_100 => way[0] = pose.x_m,
+                2_600 => assert!(motion.linear().norm() < 0.02, "{motion:?}"),
+                3_999 => way[1] = pose.x_m,
+                _ => {}
+            }
+        }
+        assert!((0.05..0.3).contains(&(way[1] - way[0])), "{way:?} m");
+        assert!(!runner.is_armed());
     }
 
     /// A frame of the IMU at a yaw of 180°; its time goes on, otherwise it would count as frozen.

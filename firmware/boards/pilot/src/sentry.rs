@@ -13,7 +13,7 @@
 //! at the top, and spins the chassis at the bottom. Arming holds the gimbal where it looks, and the chassis turns to there with both
 //! sticks at rest too.
 
-use crate::gesture::{Gesture, Wish};
+use crate::gesture::Gesture;
 use crate::loader::Loader;
 use crate::{CURRENT_LIMIT, chassis_of, wheels_of};
 use drivetrain::chassis::{Chassis, ChassisMode, Mecanum, MecanumWheels, ModeConfig, Modes};
@@ -21,7 +21,7 @@ use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, M2006, M3508};
 use drivetrain::encoder::GearRatio;
 use drivetrain::geometry::{Body, Twist};
-use drivetrain::motor::Measured;
+use drivetrain::motor::{Measured, SwitchOrder};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity, Current};
 use drivetrain::wire::dbus::{Remote, Switch};
@@ -218,12 +218,12 @@ impl Sentry {
     }
 
     /// Returns what the remote control asks for; to be called once a tick.
-    pub fn wish(&mut self, remote: &Remote) -> Wish {
-        let wish = self.gesture.wish(remote);
-        if wish == Wish::Arm {
+    pub fn order(&mut self, remote: &Remote, tick: Tick) -> SwitchOrder {
+        let order = self.gesture.read(remote, tick);
+        if order == SwitchOrder::Arm {
             self.chassis.restart();
         }
-        wish
+        order
     }
 
     /// Drives the wheels by the newest motion, and says when it was made.
@@ -285,16 +285,17 @@ mod tests {
         use Switch::{Absent, Down, Middle, Up};
         let remote =
             |right_switch, left_switch| Remote { right_switch, left_switch, ..Remote::default() };
-        let wish = |left| {
+        let order = |left| {
             let (mut sentry, ..) = Sentry::new().unwrap();
-            sentry.wish(&remote(Middle, left));
-            let turned = sentry.wish(&remote(Up, left));
+            let tick = Tick::new(Instant::from_micros(1_000), 0.001);
+            _ = sentry.order(&remote(Middle, left), tick);
+            let turned = sentry.order(&remote(Up, left), tick);
             // Let go later, it does not arm: the right switch has to be turned anew.
-            assert_ne!(sentry.wish(&remote(Up, Middle)), Wish::Arm);
+            assert_eq!(sentry.order(&remote(Up, Middle), tick), SwitchOrder::Keep);
             turned
         };
-        let wishes = [Up, Down, Absent, Middle].map(wish);
-        assert_eq!(wishes, [Wish::Rest, Wish::Rest, Wish::Rest, Wish::Arm]);
+        let (arm, keep) = (SwitchOrder::Arm, SwitchOrder::Keep);
+        assert_eq!([Up, Down, Absent, Middle].map(order), [keep, keep, keep, arm]);
     }
 
     /// The targets of the pitch, of so many seconds each in which the left stick is there; armed where the gimbal looks.

@@ -29,6 +29,7 @@ mod topics;
 use c_board_embassy::{WATCHDOG_US, can1, can2, clocks, now};
 use defmt_rtt as _;
 use drivetrain::dji::Bus;
+use drivetrain::motor::SwitchOrder;
 use drivetrain::runner::{NbAbort, Runner};
 use drivetrain::time::{Instant, Tick};
 use embassy_executor::Spawner;
@@ -39,7 +40,6 @@ use embassy_stm32::{bind_interrupts, dma, peripherals};
 use embassy_time::{Duration, Ticker};
 use halves::Halves;
 use panic_probe as _;
-use pilot::gesture::Wish;
 use pilot::sentry::{Event, Sentry};
 use topics::{AIM, ARMED, BARREL, CHASSIS_YAW, EVENTS, MOTION, REMOTE, SHOT};
 
@@ -84,21 +84,24 @@ impl Robot {
         let heard = REMOTE.try_get();
         let remote = heard.map_or_else(Default::default, |heard| parts::fresh(heard, tick.now()));
         let events = EVENTS.immediate_publisher();
-        match self.sentry.wish(&remote) {
-            Wish::Arm => {
+        let order = self.sentry.order(&remote, tick);
+        match order {
+            SwitchOrder::Arm => {
                 if !self.arm(tick) {
                     events.publish_immediate(Event::Refused);
                 }
             }
-            Wish::GoOn if self.is_armed() => {}
-            Wish::GoOn | Wish::Rest => self.rest(),
+            SwitchOrder::Keep | SwitchOrder::Brake if self.is_armed() => {}
+            SwitchOrder::Keep | SwitchOrder::Brake | SwitchOrder::Disarm => self.rest(),
         }
         let (first, second) = (self.first.device_mut(), self.second.device_mut());
-        self.sentry.roll(first, MOTION.try_get(), tick);
+        // While the remote control is lost, the sentry stands and shoots nothing.
+        let drives = order != SwitchOrder::Brake;
+        self.sentry.roll(first, MOTION.try_get().filter(|_| drives), tick);
         if let Some(aim) = AIM.try_get() {
             self.sentry.aim(first, second, &aim);
         }
-        if let Some(shot) = SHOT.try_take() {
+        if let Some(shot) = SHOT.try_take().filter(|_| drives) {
             self.sentry.shoot(second, shot);
         }
         let is_armed = self.is_armed();
