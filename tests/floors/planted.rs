@@ -15,7 +15,16 @@ fn found_with(file: &str, lines: &str) -> Vec<String> {
 }
 
 /// File, and a rule.
-const RULES: [(&str, &str); 40] = [
+const RULES: [(&str, &str); 42] = [
+    // A motor trips by a flag.
+    (
+        "dji/slot/target.rs",
+        "fn f(slot: &mut Slot, is_wrong: bool) { if is_wrong { slot.guard.trip() } }",
+    ),
+    (
+        "snake/slot/health.rs",
+        "fn f(slot: &mut Slot, is_wrong: bool) { if is_wrong { slot.guard.relax_until_armed() } }",
+    ),
     // Ages of two statements, under other names, in a field, of a function, as an argument.
     (
         "damiao/bus.rs",

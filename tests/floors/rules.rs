@@ -5,7 +5,7 @@
 //!   `time` a duration for a setting of its drive, and declares few types beside those that it shows.
 //! * An age may be compared with nothing, whatever its name, unless the table has the comparison with its reason.
 //! * A field that counts is in a table with what it counts: a count of updates is a time too.
-//! * A name with a word of the rules is in a table with what it is.
+//! * A name with a word of the rules is in a table with what it is, and each call by which a motor trips with its reason.
 
 use super::taint::{Seeds, Taint, counting_in, declared_in, words_of};
 use super::{FAMILIES, SIZES, definitions, leaves, named_paths, rust_files, sources, tokens};
@@ -176,6 +176,16 @@ const COUNTS: [(&str, &str, &[&str]); 24] = [
         "frames that enable a drive, and frames that were replaced",
         &["enabling", "superseded"],
     ),
+];
+
+/// Calls by which a motor trips, by file: how many, and why.
+const TRIPS: [(&str, usize, &str); 6] = [
+    ("dji/device.rs", 1, "the runner trips all motors"),
+    ("dji/slot/health.rs", 1, "a condition relaxes, as its configuration says"),
+    ("motor/actuator/device.rs", 1, "the runner trips the motor"),
+    ("motor/actuator/update.rs", 1, "the drive started again, or has a wrong setting"),
+    ("snake/slot/health.rs", 1, "the drive is in an unexpected state"),
+    ("snake/slot/health.rs", 1, "a joint that stalls relaxes, as its configuration says"),
 ];
 
 /// Words of the rules, as a name begins with them.
@@ -394,6 +404,15 @@ fn findings(folder: &str, files: &Files, used: &mut BTreeSet<String>) -> Vec<Str
         let asks = ["Repeat", ".guard.pass"].iter().any(|rule| text.contains(rule));
         if text.contains("is_hold()") && !asks {
             found.push(format!("{file} has its own rule for a held update"));
+        }
+        let trips = tokens.windows(3).filter(|call| {
+            call[0] == "."
+                && ["trip", "relax_until_armed"].contains(&call[1].as_str())
+                && call[2] == "("
+        });
+        let (trips, rows) = (trips.count(), TRIPS.iter().filter(|(name, ..)| name == file));
+        if trips != rows.map(|(_, trips, _)| trips).sum() {
+            found.push(format!("{file} has {trips} calls by which a motor trips"));
         }
         let mut row = |table: &[(&str, &str, &[&str])], name: &String, is: &str| {
             let listed = |(of, _, names): &&(&str, &str, &[&str])| {
