@@ -127,12 +127,13 @@ impl Watch {
             guard.trust(0);
         }
         let is_online = guard.link() == Link::Online;
-        let slow = if is_online { self.begin_slow(guard.is_armed(), &vitals, now) } else { None };
-        if is_well && slow.is_some_and(|sample| self.monitor.passes(&sample, self.config)) {
+        let since = if is_online { self.begin_slow(guard.is_armed(), &vitals, now) } else { None };
+        let passes = |since| self.monitor.passes(&vitals.sample(since, self.config), self.config);
+        if is_well && since.is_some_and(passes) {
             self.share = 1.0;
             return self.share;
         }
-        self.check_all(guard, &vitals, slow.as_ref(), now)
+        self.check_all(guard, &vitals, since, now)
     }
 
     #[cold]
@@ -141,7 +142,7 @@ impl Watch {
         &mut self,
         guard: &mut Guard,
         vitals: &Vitals,
-        slow: Option<&Sample>,
+        since: Option<Duration>,
         now: Instant,
     ) -> f32 {
         let before = guard.conditions();
@@ -150,8 +151,9 @@ impl Watch {
         } else {
             guard.latch(now, |latch| {
                 self.read_error(latch, vitals);
-                if let Some(sample) = slow {
-                    self.share = self.monitor.check(latch, sample, self.config);
+                if let Some(since) = since {
+                    let sample = vitals.sample(since, self.config);
+                    self.share = self.monitor.check(latch, &sample, self.config);
                 }
             });
         }
@@ -166,9 +168,9 @@ impl Watch {
         }
     }
 
-    /// Returns the slow quantities, if their check is due.
+    /// Returns the time since the last check of the slow quantities, if a check is due.
     #[inline]
-    fn begin_slow(&mut self, is_armed: bool, vitals: &Vitals, now: Instant) -> Option<Sample> {
+    fn begin_slow(&mut self, is_armed: bool, vitals: &Vitals, now: Instant) -> Option<Duration> {
         if now < self.next {
             return None;
         }
@@ -176,18 +178,7 @@ impl Watch {
         (self.checked, self.next) = (now, self.after(now));
         let saturated = is_armed && vitals.effort.abs() >= 1.0;
         self.saturated = self.saturated.saturating_add(u16::from(saturated));
-        Some(Sample {
-            elapsed: elapsed(since.micros_u32()),
-            fresh: false,
-            effort: vitals.effort,
-            speed: vitals.speed,
-            current: vitals.current,
-            word: 0,
-            word_change: u8::MAX,
-            angle: 0,
-            rest: 0,
-            temperature: vitals.temperature_c.zip(self.config.temperatures_c()),
-        })
+        Some(since)
     }
 
     /// Returns the next beginning of the part of this motor, at most a period after `now`.
@@ -253,6 +244,23 @@ impl Vitals {
             (true, _) => Some(Severity::Fault),
             (false, true) => Some(Severity::Warning),
             (false, false) => None,
+        }
+    }
+
+    /// Returns the slow quantities, so long after the last check.
+    #[inline]
+    fn sample(&self, since: Duration, config: &HealthConfig) -> Sample {
+        Sample {
+            elapsed: elapsed(since.micros_u32()),
+            fresh: false,
+            effort: self.effort,
+            speed: self.speed,
+            current: self.current,
+            word: 0,
+            word_change: u8::MAX,
+            angle: 0,
+            rest: 0,
+            temperature: self.temperature_c.zip(config.temperatures_c()),
         }
     }
 
