@@ -162,17 +162,23 @@ impl<M: DriveProtocol> Actuator<M> {
     #[cold]
     #[inline(never)]
     pub(super) fn decide(&mut self, step: TimeStep, now: Instant) -> bool {
-        self.is_steady = false;
+        let was_steady = core::mem::replace(&mut self.is_steady, false);
         if self.guard.has_target() && !self.motor.capabilities().has(self.kind) {
             self.guard.relax();
         }
         self.place_zero();
         let left = self.check(now);
         let drives = self.guard.drives(now);
-        if drives && !step.is_hold() && self.was_online && self.has_nothing_due() {
-            self.has_posted = false;
-            self.follow(left, step);
-            return true;
+        if drives && !step.is_hold() {
+            if was_steady {
+                self.keep_on(left, true);
+                return true;
+            }
+            if self.was_online && self.has_nothing_due() {
+                self.has_posted = false;
+                self.follow(left, step);
+                return true;
+            }
         }
         let may_drive = drives && self.offered.may_repeat.admits(step.is_hold());
         // A question that is given back from now on did not enable the drive, and rest that nobody took was not sent.
@@ -220,10 +226,15 @@ impl<M: DriveProtocol> Actuator<M> {
             self.narrow(opened, step);
             return;
         }
+        self.keep_on(left, self.has_nothing_due() && !self.joint.awaits_zero());
+    }
+
+    /// Lets so much of the output, until the slow quantities are due. Of a `settled` motor a condition alone unsettles the next update.
+    #[inline]
+    fn keep_on(&mut self, left: f32, is_settled: bool) {
         self.share = left;
         // An error and a second master are conditions too, unless ignored.
-        let is_well = self.guard.conditions().is_empty();
-        self.is_steady = is_well && self.has_nothing_due() && !self.joint.awaits_zero();
+        self.is_steady = is_settled && self.guard.conditions().is_empty();
         self.guard.wake_at(self.watch.next());
     }
 
