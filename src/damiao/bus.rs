@@ -14,6 +14,7 @@ use crate::motor::{
 use crate::time::Duration;
 use crate::units::{Angle, AngularVelocity};
 use crate::wire::mit;
+use embedded_can::StandardId;
 
 /// The largest share by which a range may differ from the range of the model: rounding of the drive's display.
 const RANGE_TOLERANCE: f32 = 1e-4;
@@ -53,7 +54,7 @@ const CHECKED: [Register; 4] = [
 pub struct Motor {
     model: Model,
     id: u8,
-    command_id: u16,
+    command_id: StandardId,
     master_id: u16,
     timeout: TimeoutUnits,
     mode: Mode,
@@ -80,7 +81,7 @@ impl Motor {
         Ok(Self {
             model,
             id,
-            command_id: mode.base() + u16::from(id),
+            command_id: StandardId::new(mode.base() + u16::from(id)).unwrap_or(StandardId::MAX),
             master_id: u16::from(id) + 0x10,
             timeout: TimeoutUnits::USUAL,
             mode,
@@ -97,7 +98,7 @@ impl Motor {
     /// [`ConfigError::Range`] for another id; [`ConfigError::Conflict`] for the id of the motor's own commands.
     pub fn with_master_id(self, master_id: u16) -> Result<Self, ConfigError> {
         ConfigError::check_range("master id", master_id.into(), 0.0, 2046.0)?;
-        if [self.command_id, self.id.into()].contains(&master_id) {
+        if [self.command_id.as_raw(), self.id.into()].contains(&master_id) {
             return Err(ConfigError::Conflict("master id"));
         }
         Ok(Self { master_id, ..self })
@@ -134,25 +135,30 @@ impl Motor {
 
     #[inline]
     fn frame_of(&self, data: [u8; 8]) -> CanFrame {
-        CanFrame::of(standard_id(self.command_id), data)
+        CanFrame::of(self.command_id, data)
     }
 
-    /// Returns the data of the command to the drive, within the share of its largest effort; `None` to rest.
+    /// Returns the goal of an order; `None` to rest.
     #[inline]
-    fn command(&mut self, order: Order) -> Option<[u8; 8]> {
+    fn goal(&mut self, order: Order) -> Option<Goal> {
         let (report, ranges) = (self.status.map(|_| &self.report)?, &self.model.ranges);
         let shaft = || Feedback::shaft(report, ranges);
-        let command = match self.mode.0.impedance_goal(order, shaft, ranges, 4_095)? {
-            Goal::Torque(torque_nm) => return Some(ranges.encode_torque(torque_nm)),
+        self.mode.0.impedance_goal(order, shaft, ranges, 4_095)
+    }
+
+    /// Returns the command to the drive, within the share of its largest effort; `None` to rest.
+    fn command(&mut self, goal: Goal, share: f32) -> Option<Command> {
+        Some(match goal {
+            Goal::Torque(torque_nm) => Command::Mit(Impedance::torque(torque_nm)),
             Goal::Impedance(command) => Command::Mit(command),
             Goal::Velocity(velocity) => Command::Velocity(velocity),
             Goal::Way(way) => {
-                let position = Feedback::decode(report, ranges)?.measured.position_rad;
+                let ranges = &self.model.ranges;
+                let position = Feedback::decode(&self.report, ranges)?.measured.position_rad;
                 let position = inside(position, way, ranges.position_rad());
-                self.mode.toward(position, order.share, &self.model)
+                self.mode.toward(position, share, &self.model)
             }
-        };
-        Some(command.encode(ranges))
+        })
     }
 
     /// Returns the configured value of a register.
@@ -183,7 +189,7 @@ impl DriveProtocol for Motor {
         let bare = (self.mode.base() > 0).then(|| command(self.id.into()));
         let feedback = Claim::feedback(standard_id(self.master_id), self.name());
         let shared = [command(REGISTERS).shared(), feedback.shared()];
-        [command(self.command_id)].into_iter().chain(bare).chain(shared)
+        [command(self.command_id.as_raw())].into_iter().chain(bare).chain(shared)
     }
 
     fn decode(&mut self, frame: &CanFrame) -> Ingest {
@@ -220,8 +226,12 @@ impl DriveProtocol for Motor {
     }
 
     fn control(&mut self, order: Order) -> CanFrame {
-        match self.command(order) {
-            Some(data) => self.frame_of(data),
+        let goal = self.goal(order);
+        if let Some(Goal::Torque(torque_nm)) = goal {
+            return self.frame_of(self.model.ranges.encode_torque(torque_nm));
+        }
+        match goal.and_then(|goal| self.command(goal, order.share)) {
+            Some(command) => self.frame_of(command.encode(&self.model.ranges)),
             None => self.rest(),
         }
     }
@@ -325,7 +335,7 @@ impl Motor {
     fn special(&mut self, data: [u8; 8]) -> CanFrame {
         self.specials = self.specials.wrapping_add(1);
         let is_bare = self.specials & 1 == 0;
-        let id = if is_bare { self.id.into() } else { self.command_id };
-        CanFrame::of(standard_id(id), data)
+        let id = if is_bare { standard_id(self.id.into()) } else { self.command_id.into() };
+        CanFrame::of(id, data)
     }
 }
