@@ -32,24 +32,23 @@ impl<M: DriveProtocol> CanDevice for Actuator<M> {
             }
             let target = *if self.is_narrowed { &self.goal } else { &self.target };
             let frame = Some(self.motor.control(Order { target, share: self.share, step }));
-            self.offered = Offered { frame, waits: true, may_repeat: Repeat::ONCE, is_rest: false };
-            self.has_frames = true;
+            let may_repeat = Repeat::ONCE;
+            self.offered = Offered { frame, waits: true, may_wait: true, may_repeat, is_rest: false };
         }
     }
 
     #[inline]
     fn next_frame(&mut self) -> Option<CanFrame> {
-        if !self.has_frames {
+        if !self.offered.may_wait {
             return None;
         }
         if self.switching.is_some() {
             return self.switching.take();
         }
-        self.has_frames = false;
-        if !self.offered.waits {
+        self.offered.may_wait = false;
+        if !core::mem::take(&mut self.offered.waits) {
             return None;
         }
-        self.offered.waits = false;
         self.last = self.offered.frame;
         self.last
     }
@@ -87,7 +86,7 @@ impl<M: DriveProtocol> CanDevice for Actuator<M> {
         } else {
             return false;
         }
-        self.has_frames = true;
+        self.offered.may_wait = true;
         true
     }
 

@@ -56,8 +56,6 @@ pub struct Actuator<M> {
     is_steady: bool,
     /// The drive is told the goal, less than the target: while the output range opens, and at a soft limit.
     is_narrowed: bool,
-    /// A frame may wait to be sent.
-    has_frames: bool,
     is_resting: bool,
     /// The share of the output that is left.
     share: f32,
@@ -111,7 +109,6 @@ impl<M: DriveProtocol> Actuator<M> {
             start: Start::NONE,
             is_steady: false,
             is_resting: true,
-            has_frames: false,
             offered: Offered::NOTHING,
             last: None,
             switching: None,
@@ -325,14 +322,13 @@ impl<M: DriveProtocol> Actuator<M> {
     const fn post(&mut self, frame: Option<CanFrame>) {
         (self.switched, self.switching) = (frame, frame);
         self.has_posted = frame.is_some();
-        self.has_frames = true;
+        self.offered.may_wait = true;
     }
 
     fn offer(&mut self, command: Option<CanFrame>) {
         self.withdraw();
         let (frame, waits) = (command.or(self.offered.frame), command.is_some());
-        self.offered = Offered { frame, waits, ..Offered::NOTHING };
-        self.has_frames = true;
+        self.offered = Offered { frame, waits, may_wait: true, ..Offered::NOTHING };
     }
 
     /// Takes back a frame still waiting for the bus.
@@ -369,6 +365,8 @@ struct Offered {
     frame: Option<CanFrame>,
     /// The frame is still to be taken.
     waits: bool,
+    /// This frame may wait, or one for the drive's power.
+    may_wait: bool,
     /// A command, which an update without a step may send once more.
     may_repeat: Repeat,
     /// Rest, not given back by the driver.
@@ -376,6 +374,11 @@ struct Offered {
 }
 
 impl Offered {
-    const NOTHING: Self =
-        Self { frame: None, waits: false, may_repeat: Repeat::NO, is_rest: false };
+    const NOTHING: Self = Self {
+        frame: None,
+        waits: false,
+        may_wait: false,
+        may_repeat: Repeat::NO,
+        is_rest: false,
+    };
 }
