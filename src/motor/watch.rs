@@ -133,7 +133,7 @@ impl Watch {
             self.share = 1.0;
             return self.share;
         }
-        self.check_all(guard, &vitals, since, now)
+        self.check_all(guard, vitals, since, now)
     }
 
     #[cold]
@@ -141,7 +141,7 @@ impl Watch {
     fn check_all(
         &mut self,
         guard: &mut Guard,
-        vitals: &Vitals,
+        vitals: Vitals,
         since: Option<Duration>,
         now: Instant,
     ) -> f32 {
@@ -150,7 +150,7 @@ impl Watch {
             self.monitor = Monitor::NEW;
         } else {
             guard.latch(now, |latch| {
-                self.read_error(latch, vitals);
+                self.read_error(latch, &vitals);
                 if let Some(since) = since {
                     let sample = vitals.sample(since, self.config);
                     self.share = self.monitor.check(latch, &sample, self.config);
