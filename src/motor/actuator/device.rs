@@ -30,7 +30,7 @@ impl<M: DriveProtocol> CanDevice for Actuator<M> {
             if self.offered.waits {
                 self.withdraw();
             }
-            let target = *if self.is_narrowed { &self.goal } else { &self.target };
+            let target = if goes_on { self.target } else { self.goal };
             let frame = Some(self.motor.control(Order { target, share: self.share, step }));
             let may_repeat = Repeat::ONCE;
             self.offered = Offered { frame, waits: true, may_wait: true, may_repeat, is_rest: false };

@@ -54,8 +54,6 @@ pub struct Actuator<M> {
     power: Power,
     /// The last update drove the motor, and as long as its rules have nothing to change, the next one is to do the same.
     is_steady: bool,
-    /// The drive is told the goal, less than the target: while the output range opens, and at a soft limit.
-    is_narrowed: bool,
     is_resting: bool,
     /// The share of the output that is left.
     share: f32,
@@ -72,6 +70,7 @@ pub struct Actuator<M> {
     motor: M,
     joint: Joint,
     watch: Watch,
+    /// What the drive is told in an update with a decision: less than the target while the output range opens, and at a soft limit.
     goal: Target,
     start: Start,
     /// This update offers a frame for the drive's power.
@@ -103,7 +102,6 @@ impl<M: DriveProtocol> Actuator<M> {
             power: Power::NEW,
             target: Target::Torque(0.0),
             kind: Capability::Torque,
-            is_narrowed: false,
             goal: Target::Torque(0.0),
             share: 0.0,
             start: Start::NONE,

@@ -220,8 +220,7 @@ impl<M: DriveProtocol> Actuator<M> {
             self.reopen();
         }
         let opened = self.guard.share();
-        self.is_narrowed = opened < 1.0 || self.watch.soft_limits().is_some();
-        if self.is_narrowed {
+        if opened < 1.0 || self.watch.soft_limits().is_some() {
             self.share = if left < opened { left } else { opened };
             self.narrow(opened, step);
             return;
@@ -232,7 +231,7 @@ impl<M: DriveProtocol> Actuator<M> {
     /// Lets so much of the output, until the slow quantities are due. Of a `settled` motor a condition alone unsettles the next update.
     #[inline]
     fn keep_on(&mut self, left: f32, is_settled: bool) {
-        self.share = left;
+        (self.goal, self.share) = (self.target, left);
         // An error and a second master are conditions too, unless ignored.
         self.is_steady = is_settled && self.guard.conditions().is_empty();
         self.guard.wake_at(self.watch.next());
