@@ -49,8 +49,9 @@ impl<M: DriveProtocol> CanDevice for Actuator<M> {
         if !core::mem::take(&mut self.offered.waits) {
             return None;
         }
-        self.last = self.offered.frame;
-        self.last
+        let frame = self.offered.frame?;
+        self.last = Some(frame);
+        Some(frame)
     }
 
     /// Each update offers the newest command anyway. A frame for the drive's power comes again if still wanted.
