@@ -33,7 +33,8 @@ impl<M: DriveProtocol> CanDevice for Actuator<M> {
             let target = if goes_on { self.target } else { self.goal };
             let frame = Some(self.motor.control(Order { target, share: self.share, step }));
             let may_repeat = Repeat::ONCE;
-            self.offered = Offered { frame, waits: true, may_wait: true, may_repeat, is_rest: false };
+            self.offered =
+                Offered { frame, waits: true, may_wait: true, may_repeat, is_rest: false };
         }
     }
 

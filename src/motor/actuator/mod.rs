@@ -372,11 +372,6 @@ struct Offered {
 }
 
 impl Offered {
-    const NOTHING: Self = Self {
-        frame: None,
-        waits: false,
-        may_wait: false,
-        may_repeat: Repeat::NO,
-        is_rest: false,
-    };
+    const NOTHING: Self =
+        Self { frame: None, waits: false, may_wait: false, may_repeat: Repeat::NO, is_rest: false };
 }
