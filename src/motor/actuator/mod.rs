@@ -316,6 +316,18 @@ impl<M: DriveProtocol> Actuator<M> {
         (shaft, limits.and_then(|limits| self.joint.inside(limits, shaft)))
     }
 
+    #[inline]
+    fn place_zero(&mut self) {
+        if !self.joint.awaits_zero() {
+            return;
+        }
+        let (lower, upper) = self.watch.soft_limits().unwrap_or((0.0, 0.0));
+        let middle = Angle::from_radians(0.5 * (lower + upper));
+        self.joint.place_zero(self.measured_angle(), middle);
+        // From now on each frame is compared with the one before.
+        self.guard.trust(0);
+    }
+
     /// Offers a frame for the drive's power.
     const fn post(&mut self, frame: Option<CanFrame>) {
         (self.switched, self.switching) = (frame, frame);

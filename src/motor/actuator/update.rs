@@ -7,7 +7,6 @@ use crate::frame::CanFrame;
 use crate::motor::guard::SILENCE_US;
 use crate::motor::{Capability, Claim, Ingest, Link, Repeat, Route, TargetError, Vitals};
 use crate::time::{Instant, TimeStep};
-use crate::units::Angle;
 use embedded_can::Frame;
 
 /// Targets, and received frames: feedback, answers, and commands of another controller.
@@ -349,18 +348,6 @@ impl<M: DriveProtocol> Actuator<M> {
             return if polls { self.motor.poll() } else { Some(self.rest()) };
         }
         self.offered.frame
-    }
-
-    #[inline]
-    fn place_zero(&mut self) {
-        if !self.joint.awaits_zero() {
-            return;
-        }
-        let (lower, upper) = self.watch.soft_limits().unwrap_or((0.0, 0.0));
-        let middle = Angle::from_radians(0.5 * (lower + upper));
-        self.joint.place_zero(self.measured_angle(), middle);
-        // From now on each frame is compared with the one before.
-        self.guard.trust(0);
     }
 
     /// Notes whether the shaft is at a soft limit.
