@@ -117,8 +117,9 @@ fn the_switch_arms_when_it_turns_and_never_by_being_on() {
     let (driven, _) = run(&[0..100, 200..400, 500..700], NEVER, NEVER, 800);
     are_near(&driven, &[200..400, 500..700]);
     // The remote control is lost: the robot brakes for a second. It is heard again with the switch on and the stick held.
-    let (driven, _) = run_with(&[200..2_500], 400..1_800, NEVER, NEVER, 2_600);
-    are_near(&driven, &[200..1_400]);
+    let (driven, _) =
+        run_with(std::slice::from_ref(&(200..2_500)), 400..1_800, NEVER, NEVER, 2_600);
+    are_near(&driven, std::slice::from_ref(&(200..1_400)));
     // An emergency stop, cleared while the switch is on.
     let (driven, refused) = run(&[100..600, 700..900, 1_000..1_200], 300, 800, 1_300);
     are_near(&driven, &[100..300, 1_000..1_200]);

@@ -291,9 +291,8 @@ impl DriveProtocol for Motor {
         }
         self.questions = self.questions.wrapping_add(1);
         let mode = self.expected(Register::RunMode);
-        let is_other =
-            self.settings.found(Register::RunMode).is_some_and(|it| it.to_bits() != mode.to_bits());
-        if is_other && self.questions.is_multiple_of(4) {
+        let found = self.settings.found(Register::RunMode).map(f32::to_bits);
+        if found.is_some_and(|it| it != mode.to_bits()) && self.questions.is_multiple_of(4) {
             return Some(self.frame_of(Command::Write(Register::RunMode, mode)));
         }
         let asked = self.settings.inquire()?;
@@ -314,9 +313,7 @@ impl DriveProtocol for Motor {
                     self.settings.take(asked, value);
                 }
             }
-            FAULTS => {
-                (self.reported, self.has_cleared) = (u32::from_le_bytes([a, b, c, d]), false);
-            }
+            FAULTS => (self.reported, self.has_cleared) = (u32::from_le_bytes([a, b, c, d]), false),
             _ => {}
         }
         true

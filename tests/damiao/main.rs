@@ -19,7 +19,8 @@ use drivetrain::error::ConfigError;
 use drivetrain::motor::{
     Actuator, AngleDrive, Devices, Impedance, ImpedanceControl, TargetError, VelocityDrive,
 };
-use drivetrain::sim::{DamiaoDrive, Drive, DriveShaft};
+use drivetrain::runner::{Nb, Runner};
+use drivetrain::sim::{DamiaoDrive, Drive, DriveShaft, Line, Simulation};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 
@@ -32,6 +33,40 @@ fn a_motor_is_armed_when_its_settings_have_been_read() {
     assert!(refused(&mut bench).starts_with("DM-J4310 #1 has not answered yet what its "));
     bench.steps(60, |_| {});
     assert_eq!(bench.own.arm(bench.now()), Ok(()));
+}
+
+/// As delivered, each drive has the id 1.
+#[test]
+fn two_drives_with_one_id_on_a_bus_are_not_armed() {
+    let world = Simulation::new(1);
+    let mut drives = [0.0, 1.5].map(|angle| {
+        let mut shaft = DriveShaft::new(0.02, 0.05);
+        shaft.set_angle(angle);
+        DamiaoDrive::of(Model::J4310, 1).with_shaft(shaft)
+    });
+    let joint = Actuator::new(Motor::new(Model::J4310, 1, mit()).unwrap());
+    let mut runner = Runner::new(Nb(world.controller()), world.clock(), joint);
+    for (ms, is_alone) in (0..6_000).map(|ms| (ms, ms > 3_000)) {
+        let [one, two] = &mut drives;
+        let [one, two]: [&mut dyn Drive; 2] = [one, two];
+        let mut pair = [(Line::Can1, one), (Line::Can1, two)];
+        let shown = if is_alone { &mut pair[..1] } else { &mut pair[..] };
+        world.advance_drives(Duration::from_millis(1), shown).unwrap();
+        runner.poll(16);
+        let Some(tick) = runner.due() else { continue };
+        match ms {
+            3_000 => {
+                let refused = runner.arm(tick).unwrap_err().to_string();
+                assert!(refused.contains("DM-J4310 #1"), "{refused}");
+                let edge = runner.device_mut().next_edge().unwrap().to_string();
+                assert!(edge.starts_with("DM-J4310 #1: duplicate id began"), "{edge}");
+            }
+            5_500 => runner.arm(tick).unwrap(),
+            _ => {}
+        }
+        runner.tick(tick);
+    }
+    assert!(runner.is_armed());
 }
 
 #[test]

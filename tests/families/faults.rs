@@ -19,6 +19,7 @@ pub(crate) const CASES: &[Case] = &[
     ("F05", second_master),
     ("F06", impossible),
     ("F07", |family| Ok(handed_back(family.station(), |drive, frame| drive.of_neighbour(frame)))),
+    ("F08", two_drives),
     ("F09", |family| Ok(twice(family))),
     ("F10", |family| Ok(out_of_order(family.station()))),
     ("F11", |family| Ok(burst(family.station()))),
@@ -171,6 +172,28 @@ fn second_master(family: &Family) -> Outcome {
     let refused = station.device.arm(station.now());
     assert!(matches!(refused, Err(ArmError::SecondMaster(_))), "{refused:?}");
     Ok(if is_armed { "not armed; driven on" } else { "not armed; tripped" }.to_owned())
+}
+
+/// Two drives with one id, as delivered, answer each frame twice until one is unplugged.
+fn two_drives(family: &Family) -> Outcome {
+    let mut station = family.station();
+    station.bend = Some(Box::new(|_, frame| vec![*frame, *frame]));
+    station.steps(2_200, |_| {});
+    let refused = station.device.arm(station.now());
+    if refused.is_ok() {
+        return Err("such a drive sends feedback by itself, at a rate of its own");
+    }
+    // The second echo of a drive that echoes commands is one of another node.
+    let condition = match refused {
+        Err(ArmError::Faulty(_)) => Condition::DuplicateId,
+        Err(ArmError::SecondMaster(_)) => Condition::SecondMaster,
+        _ => panic!("{refused:?}"),
+    };
+    assert!(station.device.conditions().contains(condition));
+    station.bend = None;
+    station.steps(2_200, |_| {});
+    station.device.arm(station.now()).unwrap();
+    Ok("not armed until one is alone".to_owned())
 }
 
 fn impossible(family: &Family) -> Outcome {

@@ -162,6 +162,9 @@ impl<M: DriveProtocol> Actuator<M> {
     #[inline(never)]
     pub(super) fn decide(&mut self, step: TimeStep, now: Instant) -> bool {
         let was_steady = core::mem::replace(&mut self.is_steady, false);
+        if self.motor.frames_per_answer() == 1 {
+            self.watch.ask();
+        }
         if self.guard.has_target() && !self.motor.capabilities().has(self.kind) {
             self.guard.relax();
         }

@@ -20,7 +20,8 @@
 //! | duplicate id | each frame, after a second of too many frames | |
 //!
 //! An [`Actuator`](super::Actuator) and a motor without CAN are checked in each of their updates for errors, and each 8.2 ms
-//! for the rest: once armed, motors whose ids differ in the lower three bits in different milliseconds.
+//! for the rest: once armed, motors whose ids differ in the lower three bits in different milliseconds. A duplicate id is found while such a
+//! motor rests for a second, of drives that send answers alone.
 
 mod config;
 mod edge;
