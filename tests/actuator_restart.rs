@@ -130,6 +130,36 @@ fn a_drive_that_counts_anew_moves_no_joint_and_no_target() {
     }
 }
 
+/// A slipped encoder, a zero set by a tool, another drive with the same id: the joint is not where its angle says.
+#[test]
+fn an_angle_that_jumps_by_no_whole_turn_takes_the_zero_of_a_drive_that_knows_its_angle() {
+    for jump in [1.0, -1.0, PI, TAU + 1.0] {
+        let mut bench = Bench::new(true, 0.5);
+        bench.hear(3, 0.5 + jump, 0.0);
+        assert_eq!((bench.angle(), bench.0.is_armed()), (None, false), "{jump}");
+        assert_eq!(bench.update(3, 0.001), None);
+        assert!(edges(&mut bench).contains(&(Condition::PositionUncertain, true)));
+        assert_eq!(bench.0.set_angle((), Angle::ZERO), Err(TargetError::Relaxed));
+        for ms in 4..200 {
+            bench.hear(ms, 0.5 + jump, 0.0);
+            assert_eq!(bench.update(ms, 0.001), None);
+        }
+        bench.0.arm(at_ms(199)).unwrap();
+        assert_eq!(bench.0.set_angle((), Angle::ZERO), Err(TargetError::NotHomed));
+        bench.0.set_present_angle(Angle::ZERO).unwrap();
+        assert_eq!(bench.0.set_angle((), Angle::ZERO), Ok(()));
+    }
+    // Frames of 31 ms that are taken at one time, at 30 rad/s, are no jump; nor is an angle that comes back after a silence.
+    let mut bench = Bench::new(true, 0.0);
+    let angle = |ms: u64| 0.03 * (ms - 2) as f32;
+    for (ms, of_ms) in [(36, 3), (36, 4), (36, 5), (37, 37)] {
+        bench.hear(ms, angle(of_ms), 30.0);
+    }
+    assert_near(bench.angle(), angle(37));
+    bench.hear(400, angle(37) + 1.0, 0.0);
+    assert_near(bench.angle(), angle(37) + 1.0);
+}
+
 /// A held step repeats no command from before: it has the other count. Without a restart it repeats one once.
 #[test]
 fn a_held_step_after_a_restart_sends_no_angle_from_before() {

@@ -65,7 +65,8 @@ impl Joint {
     /// Takes the angle of a frame of feedback, so long after the frame before, after a silence or not. A drive counts anew if the angle is
     /// further away than the shaft can have turned. Returns by how much the drive counts further than before; `None` if the zero is lost.
     ///
-    /// A jump by whole turns is no loss: some drives count within a turn.
+    /// A jump by whole turns is no loss: some drives count within a turn. Any other jump without a silence is a loss for every drive: an
+    /// encoder slipped, a tool set the zero, or another drive answers.
     pub(super) fn follow(
         &mut self,
         reading: Option<Reading>,
@@ -101,7 +102,7 @@ impl Joint {
                 Some(Angle::ZERO)
             }
             _ if !is_silence && gap_s > known_s => self.lose_zero(),
-            Zero::Placed(zero) => {
+            Zero::Placed(zero) if is_silence || is_usual(way.wrapped()) => {
                 *zero = *zero + turns;
                 Some(turns)
             }

@@ -172,6 +172,9 @@ impl<M: DriveProtocol> Actuator<M> {
     /// Takes the angle of the drive at which the joint is at zero, by a calibration. No drive keeps its turns without supply: the joint is
     /// within half a turn of its zero, or of the middle of its soft limits, when it is heard first, and turns by less than half a turn while its drive has no supply.
     ///
+    /// The zero is lost, as told for [`set_present_angle`](Self::set_present_angle), if the angle jumps by no whole turn without a silence: an
+    /// encoder slipped, a tool or the program set the zero of the drive, or another drive answers.
+    ///
     /// # Errors
     /// [`ConfigError::NotFinite`]; [`ConfigError::Unsupported`] for a drive without [`Capability::AbsoluteAngle`].
     pub fn with_zero(mut self, angle: Angle) -> Result<Self, ConfigError> {
@@ -189,7 +192,7 @@ impl<M: DriveProtocol> Actuator<M> {
     ///
     /// A drive without [`Capability::AbsoluteAngle`] counts from another angle when it has lost its supply. Once no feedback was taken for
     /// 100 ms, for less where it is offline sooner, for longer where it is late only then, or an angle is further away than the shaft turned since the feedback before, the
-    /// zero is lost. The motor trips, the joint has no angle, and targets with an angle are refused as [`TargetError::NotHomed`], until
+    /// zero is lost. A drive with [`Capability::AbsoluteAngle`] loses the zero only by an angle that jumps by no whole turn without such a silence. The motor trips, the joint has no angle, and targets with an angle are refused as [`TargetError::NotHomed`], until
     /// this is called again. A joint that was never given a zero counts as its drive, and has none to lose.
     ///
     /// # Errors
