@@ -30,7 +30,7 @@ const ACCELERATION: f32 = 6.0 * 9.806_65 / 32_768.0;
 
 /// The usual time between two samples, in s: that of the filter's accelerometer part.
 const PERIOD_S: f32 = 0.001;
-/// A longer time between two samples starts the attitude anew.
+/// A longer time between two samples moves nothing: the turn of the board meanwhile is unknown.
 const LONGEST: Duration = Duration::from_millis(20);
 /// A sensor whose six values repeat this often is frozen: its noise moves the last bits.
 const REPEATS: u8 = 50;
@@ -78,7 +78,8 @@ impl<A: SpiDevice, G: SpiDevice> Bmi088<A, G> {
 
     /// Reads both parts and steps the filter by the time since the call before.
     ///
-    /// A time that does not lie after that of the call before, and one more than 20 ms later, only begins anew.
+    /// A time that does not lie after that of the call before, and one more than 20 ms later, moves nothing: the attitude goes on from the
+    /// one before with the next call. Gravity then corrects roll and pitch; the yaw stays off by the turn of the board during the pause.
     ///
     /// # Errors
     /// Says why there is no new attitude; the one before holds for 20 ms.
@@ -97,8 +98,8 @@ impl<A: SpiDevice, G: SpiDevice> Bmi088<A, G> {
         else {
             return Ok(());
         };
+        // A filter that begins anew has another yaw: the room would turn.
         if step > LONGEST {
-            self.filter.reset_state();
             return Ok(());
         }
         let rates = gyroscope.map(|count| f32::from(count) * RATE);

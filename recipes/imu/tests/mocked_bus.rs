@@ -125,6 +125,25 @@ fn a_quarter_turn_to_the_left_is_a_heading_of_90_degrees() {
     assert!((back - start).abs() < 1.0, "{start} to {back}");
 }
 
+/// The loop stands still for 25 ms, as while a page of flash is erased.
+#[test]
+fn a_pause_keeps_the_yaw() {
+    let chip = Chip::level();
+    let mut imu = imu(&chip);
+    for now in 1..=3_000 {
+        chip.rates.set([0.0, 0.0, if now > 2_000 { 90.0 } else { 0.0 }]);
+        imu.poll(ms(now)).unwrap();
+    }
+    let yaw = |imu: &Bmi088<_, _>, now| Some(imu.heading(ms(now))?.angle().as_degrees());
+    let before = yaw(&imu, 3_000).unwrap();
+    chip.rates.set([0.0; 3]);
+    imu.poll(ms(3_025)).unwrap();
+    assert_eq!(yaw(&imu, 3_025), None, "the attitude is older than 20 ms");
+    imu.poll(ms(3_026)).unwrap();
+    let after = yaw(&imu, 3_026).unwrap();
+    assert!((after - before).abs() < 1.0, "{before} to {after}");
+}
+
 #[test]
 fn a_board_that_is_tilted_tells_its_roll_and_pitch_by_gravity() {
     let chip = Chip::level();
