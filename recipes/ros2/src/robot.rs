@@ -37,9 +37,10 @@ impl Command {
         self.0 = is_finite.then(|| (Twist::new(x, y, turn), now));
     }
 
-    /// Returns the motion; zero if the command has expired.
-    fn motion(&self, now: Instant) -> Twist<Body> {
-        self.0.filter(|(_, at)| now.since(*at) <= EXPIRY).map_or(Twist::ZERO, |(motion, _)| motion)
+    /// Returns the motion; zero if the command has expired, and unless all wheels are armed: if a wheel is lost, the others brake.
+    fn motion(&self, now: Instant, is_armed: bool) -> Twist<Body> {
+        let fresh = self.0.filter(|(_, at)| is_armed && now.since(*at) <= EXPIRY);
+        fresh.map_or(Twist::ZERO, |(motion, _)| motion)
     }
 }
 
@@ -134,8 +135,8 @@ pub fn run() -> Result<(), Box<dyn Error>> {
         runner.poll(32);
         let Some(tick) = runner.due() else { continue };
         // Arms by itself, as only a simulated robot may.
-        let _not_yet = runner.is_armed() || runner.arm(tick).is_ok();
-        chassis.set_body(command.motion(tick.now()));
+        let is_armed = runner.is_armed() || runner.arm(tick).is_ok();
+        chassis.set_body(command.motion(tick.now(), is_armed));
         chassis.drive(runner.device_mut(), wheels, tick);
         runner.tick(tick);
         ticks = ticks.wrapping_add(1);
@@ -164,15 +165,16 @@ mod tests {
     fn a_command_holds_for_its_time_and_one_that_is_not_finite_stops() {
         let at = |ms| Instant::START + Duration::from_millis(ms);
         let mut command = Command::default();
-        assert_eq!(command.motion(at(0)), Twist::ZERO);
+        assert_eq!(command.motion(at(0), true), Twist::ZERO);
         command.hear(&ahead(0.5), at(100));
-        assert_eq!(command.motion(at(600)), Twist::new(0.5, 0.0, 0.0));
-        assert_eq!(command.motion(at(601)), Twist::ZERO);
+        assert_eq!(command.motion(at(600), true), Twist::new(0.5, 0.0, 0.0));
+        assert_eq!(command.motion(at(601), true), Twist::ZERO);
+        assert_eq!(command.motion(at(600), false), Twist::ZERO, "a wheel is lost");
         // The last one is finite as f64 only.
         for bad in [f64::NAN, f64::INFINITY, 1e300] {
             command.hear(&ahead(0.5), at(700));
             command.hear(&ahead(bad), at(701));
-            assert_eq!(command.motion(at(702)), Twist::ZERO, "{bad}");
+            assert_eq!(command.motion(at(702), true), Twist::ZERO, "{bad}");
         }
     }
 }
