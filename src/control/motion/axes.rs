@@ -161,6 +161,9 @@ impl Mean {
 /// A target with a velocity is met where it was told to be, so a target that moves on is pursued: tell the follower where it will be
 /// after [`left_s`](Self::left_s) to meet it.
 ///
+/// The follower does not know the motors: its plan goes on while they are disarmed. Until the motors are armed, make the follower
+/// [`new`](Self::new) in each step, at the measured state: otherwise the motors leap to the plan, beyond its limits.
+///
 /// # Edge behaviour
 /// A `dt_s` that is zero, negative, NaN or infinite, a target that is NaN or infinite, and limits that [`Motion::plan`] would refuse change
 /// nothing: the last states are returned, and [`rejected`](Self::rejected) grows. A long step is one along the plan. Steps of
