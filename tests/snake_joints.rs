@@ -2,7 +2,7 @@
 
 #![cfg(test)]
 
-use drivetrain::encoder::Position;
+use drivetrain::encoder::{Homing, Position};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{ArmError, Condition, Devices, Link, TargetError};
 use drivetrain::runner::{Nb, Runner};
@@ -60,6 +60,9 @@ impl<'w> Robot<'w> {
             self.runner.poll(16);
             let Some(tick) = self.runner.due() else { continue };
             let asks = self.is_eager && !self.runner.is_armed() && tick.now() >= self.asks_at;
+            if asks {
+                self.set_lost_zeros();
+            }
             if asks && self.runner.arm(tick) == Err(ArmError::NotReleased) {
                 self.released += 1;
                 self.asks_at = tick.now() + Duration::from_millis(100);
@@ -80,6 +83,16 @@ impl<'w> Robot<'w> {
             self.runner.device_mut().zero(joint).unwrap();
         }
         self.runner.device_mut().arm(now).unwrap();
+    }
+
+    /// Makes the present positions zero where the zero was lost.
+    fn set_lost_zeros(&mut self) {
+        for joint in &self.joints {
+            let joints = self.runner.device_mut();
+            if joints.state(*joint).is_some_and(|state| state.homing == Homing::Uncertain) {
+                joints.zero(*joint).unwrap();
+            }
+        }
     }
 
     fn degrees(&self, joint: usize) -> f32 {
@@ -186,6 +199,10 @@ fn a_joint_that_is_unplugged_is_named_and_comes_back() {
     assert_eq!(robot.runner.device().link(joint), Some(Link::Online));
     let now = world.now();
     robot.runner.device_mut().arm(now).unwrap();
+    robot.run(100);
+    assert!(!robot.is_enabled(2) && robot.is_enabled(1));
+    assert_eq!(robot.runner.device_mut().set_pulses(joint, 0), Err(TargetError::NotHomed));
+    robot.set_lost_zeros();
     robot.run(100);
     assert!(robot.is_enabled(2));
 }

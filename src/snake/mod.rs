@@ -38,7 +38,8 @@
 //! lost frame: in its turn as long as new targets leave room, and with the first check of ages after 100 ms as a new target. The enable is
 //! never repeated. A drive that lost its supply for less than *late* stays disabled, is detected ([`State::resets`]), and waits to be armed.
 //! After a longer loss, the joint was late: it is brought up from the beginning and keeps its zero, and after 100 ms loses its zero and waits
-//! to be armed.
+//! to be armed. A joint that lost its zero takes no target, as [`NotHomed`](crate::motor::TargetError::NotHomed), until [`Joints::zero`] or
+//! [`Joints::set_offset`].
 //!
 //! # Conditions
 //! Every change is an [`Edge`](crate::time::Edge) with its time, latched until [`Joints::next_edge`] reads it. [`Joints::health`] is the
@@ -48,7 +49,7 @@
 //! |---|---|---|
 //! | late, offline | there is no fresh position; the joint is lost, until ten positions in a row | is disabled; waits to be armed after *offline*, or 100 ms (and *late*) without a position |
 //! | ESC fault | the joint was found disabled before *late*, or further off than possible, until armed | is disabled, waits to be armed |
-//! | position uncertain | the drive may have lost its zero, until the zero is set | was relaxed by the loss; goes on once armed |
+//! | position uncertain | the drive may have lost its zero, until the zero is set | is relaxed by the loss; once armed, refuses targets until the zero is set, unless the joint was never given a zero |
 //! | stalled | the joint is away from its target and does not move: blocked in either direction | as configured; goes on |
 //! | command lost | the application let the target expire | is disabled, until the next target |
 //! | second master | another node wrote to the joint or polled it within the last second | goes on, and is not armed |

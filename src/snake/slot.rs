@@ -6,7 +6,7 @@ use super::config::{Settings, Stall};
 use super::model::{FASTEST, PULSES_PER_TURN, name};
 use super::{AttachError, Command, Config, Register};
 use crate::encoder::Homing;
-use crate::motor::{Condition, Guard, Link, MotorName, Timeouts, Traffic};
+use crate::motor::{Condition, Guard, Link, MotorName, TargetError, Timeouts, Traffic};
 use crate::time::{Duration, Instant};
 use core::f32::consts::TAU;
 
@@ -231,6 +231,17 @@ impl Slot {
         self.turn = (self.turn + TURNS - 1) % TURNS;
     }
 
+    /// Tells whether a new target may be taken. A drive whose zero was lost may count from another angle, whole turns away.
+    #[inline]
+    pub(super) fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
+        self.guard.admit(is_finite)?;
+        if self.homing == Homing::Uncertain {
+            self.guard.relax();
+            return Err(TargetError::NotHomed);
+        }
+        Ok(())
+    }
+
     /// Sets a target in pulses from the joint's zero.
     pub(super) fn set_target(&mut self, pulses: i32) {
         let target = self.offset.target(self.directed(pulses));
@@ -258,15 +269,14 @@ impl Slot {
         }
     }
 
-    /// Makes the present position zero; `false` if the position is unknown.
-    pub(super) fn zero(&mut self, now: Instant) -> bool {
-        match self.raw {
-            Some(raw) if self.guard.link() == Link::Online => {
-                self.set_offset(Offset(raw), now);
-                true
-            }
-            _ => false,
-        }
+    /// Makes the present position zero.
+    ///
+    /// # Errors
+    /// [`TargetError::NoFeedback`] if the position is unknown.
+    pub(super) fn zero(&mut self, now: Instant) -> Result<(), TargetError> {
+        let raw = self.raw.filter(|_| self.guard.link() == Link::Online);
+        self.set_offset(Offset(raw.ok_or(TargetError::NoFeedback)?), now);
+        Ok(())
     }
 
     pub(super) fn set_offset(&mut self, offset: Offset, now: Instant) {

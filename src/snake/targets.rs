@@ -13,15 +13,15 @@ use crate::units::AngularVelocity;
 /// ([`Timeouts::command`](crate::motor::Timeouts::command)): if an application stops setting targets, its joints are disabled.
 ///
 /// # Errors
-/// A target fails, and is not kept for later, if the joint is detached, not armed, relaxed by a fault or not online. NaN or infinity also
-/// fails, and cancels the present target.
+/// A target fails, and is not kept for later, if the joint is detached, not armed, relaxed by a fault, not online, or has
+/// [lost its zero](Joints::set_offset). NaN or infinity also fails, and cancels the present target.
 impl Joints {
     /// Sets the position to go to, from the joint's zero. Saturates at the ±32768 turns of the joint's counter.
     ///
-    /// Costs 79 instructions on a Cortex-M4F (`docs/figures.md`).
+    /// Costs 87 instructions on a Cortex-M4F (`docs/figures.md`).
     ///
     /// # Errors
-    /// Fails unless the joint is attached, armed and online, and for NaN and infinity.
+    /// Fails unless the joint is attached, armed and online, for NaN and infinity, and as [`TargetError::NotHomed`] after a loss of the zero.
     pub fn set_position(&mut self, joint: Joint, position: Position) -> Result<(), TargetError> {
         let turns = position.turns().clamp(-32_768, 32_767);
         let turns = i32::try_from(turns).unwrap_or(0) * PULSES_PER_TURN;
@@ -32,7 +32,7 @@ impl Joints {
     /// Sets the position to go to, in pulses from the joint's zero: the wire's own scale, 65536 a turn.
     ///
     /// # Errors
-    /// Fails unless the joint is attached, armed and online.
+    /// Fails unless the joint is attached, armed and online, and as [`TargetError::NotHomed`] after a loss of the zero.
     pub fn set_pulses(&mut self, joint: Joint, pulses: i32) -> Result<(), TargetError> {
         self.aim(joint, true, |slot| slot.set_target(pulses))
     }
@@ -84,16 +84,18 @@ impl Joints {
     /// The joint is detached, or not online: its position is then unknown.
     pub fn zero(&mut self, joint: Joint) -> Result<(), TargetError> {
         let now = self.now;
-        let slot = self.slot_mut(joint).ok_or(TargetError::Detached)?;
-        if !slot.zero(now) {
-            return Err(TargetError::NoFeedback);
-        }
+        self.slot_mut(joint).ok_or(TargetError::Detached)?.zero(now)?;
         self.relax(joint);
         Ok(())
     }
 
     /// Sets the position of a joint's zero in the counts of its drive, in pulses: for example a stored one. A joint with a target is
     /// relaxed.
+    ///
+    /// A zero, of this function or of [`zero`](Self::zero), is lost when the drive may have lost its supply: such a drive may count from
+    /// another angle. The state is then [`Homing::Uncertain`](crate::encoder::Homing::Uncertain), and targets are refused as
+    /// [`TargetError::NotHomed`] until the zero is set again, once the joint is online. A stored zero is right only if the drive has kept its
+    /// count. A joint that was never given a zero counts as its drive, and has none to lose.
     ///
     /// ```text
     /// position shown = raw - offset        target sent = wanted + offset
@@ -216,10 +218,7 @@ impl Joints {
         set: impl FnOnce(&mut Slot),
     ) -> Result<(), TargetError> {
         let slot = self.slot_mut(joint).ok_or(TargetError::Detached)?;
-        let outcome = slot.guard.admit(is_finite);
-        if outcome.is_ok() {
-            set(slot);
-        }
+        let outcome = slot.admit(is_finite).map(|()| set(slot));
         // A refused target also cancels the present one.
         self.let_go(joint.index());
         outcome

@@ -131,7 +131,7 @@ pub enum Reset {
     /// Nothing: 0.
     #[default]
     None,
-    /// Takes the present positions as zero, and enables: 1.
+    /// Takes the present positions as zero, and enables: 1. A joint of [`snake`](crate::snake) that lost its zero takes targets only after this.
     Rezero,
     /// Disables all joint motors: 6.
     Disable,

@@ -24,7 +24,7 @@ pub(crate) fn checks(run: &Run) -> Vec<Check> {
     let Some(trouble) = run.setup.trouble else { return list };
     match trouble {
         Trouble::HostLineCut | Trouble::CorruptStream => host_is_lost(run, &mut check),
-        Trouble::SilentJoint | Trouble::JointPowerLoss => joint_is_lost(run, trouble, &mut check),
+        Trouble::SilentJoint | Trouble::JointPowerLoss => joint_is_lost(run, &mut check),
         Trouble::ResetInMotion => zeroed_in_motion(run, &mut check),
         Trouble::ControllerReset => controller_starts(run, &mut check),
     }
@@ -90,8 +90,8 @@ fn host_is_lost(run: &Run, check: &mut impl FnMut(bool, String)) {
     stays_relaxed_until_told(run, check);
 }
 
-/// F15, F24: the joint is offline, so all relax; it waits for the operator; after a loss of supply its zero is in doubt.
-fn joint_is_lost(run: &Run, trouble: Trouble, check: &mut impl FnMut(bool, String)) {
+/// F15, F24: the joint is offline, so all relax; it waits for the operator; its zero is in doubt, for its drive may have lost its supply.
+fn joint_is_lost(run: &Run, check: &mut impl FnMut(bool, String)) {
     let relaxed_at = at_event(run, FAULT_S, |event| *event == Event::Relaxed("a motor is lost"));
     let in_time = relaxed_at.is_some_and(|s| s <= FAULT_S + OFFLINE_S);
     check(in_time, format!("the lost joint relaxed the robot at {}", shown(relaxed_at)));
@@ -109,10 +109,8 @@ fn joint_is_lost(run: &Run, trouble: Trouble, check: &mut impl FnMut(bool, Strin
         unanswered.is_some_and(|count| count > 10),
         format!("{} requests to it were not answered", unanswered.unwrap_or(0)),
     );
-    if trouble == Trouble::JointPowerLoss {
-        let homed = run.joints.iter().flatten().all(|joint| joint.homing == Homing::Homed);
-        check(homed, "its zero, in doubt since, was set again by the operator".to_owned());
-    }
+    let homed = run.joints.iter().flatten().all(|joint| joint.homing == Homing::Homed);
+    check(homed, "its zero, in doubt since, was set again by the operator".to_owned());
 }
 
 /// The present position is the new zero: a jump of what is shown, and none of what moves.

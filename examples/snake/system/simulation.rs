@@ -74,7 +74,9 @@ impl Trouble {
                 Operator(steps)
             }
             // Where the zero was is forgotten.
-            Self::JointPowerLoss | Self::ControllerReset => start.and_again(AGAIN_S, true),
+            Self::SilentJoint | Self::JointPowerLoss | Self::ControllerReset => {
+                start.and_again(AGAIN_S, true)
+            }
             _ => start.and_again(AGAIN_S, false),
         }
     }

@@ -51,7 +51,57 @@ fn a_silent_joint_is_late_after_40_ms_and_offline_after_100_and_the_others_go_on
     assert!(!sent.iter().any(|(id, command)| *id == 5 && !command.is_safe()));
     assert_eq!(bench.state(4).link, Link::Online);
     bench.joints.arm(at_ms(bench.ms)).unwrap();
+    assert!(!bench.drive(100).iter().any(|(id, command)| *id == 5 && !command.is_safe()));
+    bench.joints.zero(bench.handles[4]).unwrap();
     assert!(bench.drive(100).iter().any(|(id, command)| *id == 5 && !command.is_safe()));
+}
+
+/// Two turns from its zero a joint loses its supply for a second, and its drive counts from 0 again: an old target leads two turns further.
+#[test]
+fn a_joint_whose_zero_was_lost_takes_no_target_until_its_zero_is_set() {
+    for silent_ms in [101, 1_000] {
+        let mut bench = Bench::new(&[1, 2]);
+        bench.raw[0] = 2 * PULSES_PER_TURN;
+        bench.run(30);
+        let [lost, other] = [bench.handles[0], bench.handles[1]];
+        bench.joints.set_offset(lost, 0).unwrap();
+        bench.joints.arm(at_ms(bench.ms)).unwrap();
+        let position = Position::new(2, Angle::ZERO);
+        for _ in 0..300 {
+            bench.joints.set_position(lost, position).unwrap();
+            bench.run(1);
+        }
+        bench.silent = std::vec![1];
+        bench.run(silent_ms);
+        (bench.raw[0], bench.enabled[0]) = (0, 0);
+        bench.silent.clear();
+        bench.run(300);
+        bench.joints.arm(at_ms(bench.ms)).unwrap();
+        for _ in 0..100 {
+            assert_eq!(bench.joints.set_position(lost, position), Err(TargetError::NotHomed));
+            assert_eq!(bench.joints.set_pulses(lost, 0), Err(TargetError::NotHomed));
+            bench.joints.set_pulses(other, 0).unwrap();
+            bench.run(1);
+        }
+        assert!(bench.joints.is_armed() && bench.enabled[..2] == [0, 1], "{silent_ms}");
+        bench.joints.set_offset(lost, -2 * PULSES_PER_TURN).unwrap();
+        for _ in 0..100 {
+            bench.joints.set_position(lost, position).unwrap();
+            bench.run(1);
+        }
+        assert_eq!((bench.enabled[0], bench.state(0).homing), (1, Homing::Homed));
+    }
+}
+
+/// A joint that was never given a zero counts as its drive.
+#[test]
+fn a_joint_without_a_zero_has_none_to_lose() {
+    let mut bench = Bench::armed(&[1]);
+    bench.run_silent(1, 1_000);
+    bench.run(300);
+    bench.joints.arm(at_ms(bench.ms)).unwrap();
+    bench.drive(100);
+    assert_eq!((bench.enabled[0], bench.state(0).homing), (1, Homing::Relative));
 }
 
 #[test]

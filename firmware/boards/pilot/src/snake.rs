@@ -135,7 +135,8 @@ impl Snake {
         _ = bus.zero(self.finger);
     }
 
-    /// Sets the targets. Those of motors that are not armed are refused, which is harmless.
+    /// Sets the targets. Those of motors that are not armed are refused, which is harmless; so are those of a joint that lost its zero, which
+    /// rests until the computer asks for [`Wish::Rezero`], with the robot in its zero pose.
     pub fn follow(&self, (joints, bus): &mut Motors, command: &HostCommand) {
         let targets = command.speeds_rpm.into_iter().zip(command.positions_pulses);
         for (joint, (rpm, pulses)) in self.joints.into_iter().zip(targets) {
