@@ -132,6 +132,7 @@ impl DriveProtocol for Motor {
     /// Some commands give way to questions: the drive goes on with the command before. A new command goes first. After a silence
     /// nothing counts from the angle until the angle has been read again.
     fn control(&mut self, order: Order) -> CanFrame {
+        self.resets = false;
         if let (Some(track), Some(drive)) = (&mut self.track, &self.drive) {
             let way = 100.0 * f32::from(drive.velocity_dps) * order.step.dt_s();
             track.advance(way, drive.angle_deg);

@@ -13,7 +13,7 @@ const TIMEOUT_MS: u32 = 100;
 
 /// A motor of this family, in one control mode: see the [module](super).
 ///
-/// Costs 4266 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
+/// Costs 4279 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
 ///
 /// Costs 148 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
 ///
@@ -116,7 +116,7 @@ impl Motor {
     }
 
     /// Asks the drive to start anew, once, when it has been switched off: some errors go away by that alone. It is silent for more
-    /// than a second then, and may count its angle from another zero. A holding brake is locked meanwhile.
+    /// than a second then, and may count its angle from another zero. A holding brake is locked meanwhile. A driven motor forgets the request.
     pub const fn reset_drive(&mut self) {
         self.resets = true;
     }

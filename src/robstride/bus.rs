@@ -21,7 +21,7 @@ const COMMANDS: [(u32, u32); 3] =
 
 /// A motor of this family in a run mode: see the [module](super).
 ///
-/// Costs 3940 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
+/// Costs 3945 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
 ///
 /// Costs 137 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
 ///
@@ -142,14 +142,15 @@ impl Motor {
         Ok(())
     }
 
-    /// Makes the present position zero; while the motor is disarmed. The frame goes out once. A RobStride keeps the zero over a loss of
-    /// the supply if [stored](Self::store), a CyberGear does not.
+    /// Makes the present position zero; while the motor is disarmed. The frame goes out once. A driven motor forgets the request: the shaft
+    /// would be elsewhere when the motor is disarmed. A RobStride keeps the zero over a loss of the supply if [stored](Self::store), a
+    /// CyberGear does not.
     pub const fn set_zero(&mut self) {
         self.once = Some(Command::SetZero);
     }
 
-    /// Gives the drive another id, 1 to 127, at once; while the motor is disarmed. The frame goes out once. This motor then hears no more
-    /// of the drive: make another motor.
+    /// Gives the drive another id, 1 to 127, at once; while the motor is disarmed. The frame goes out once, and a driven motor forgets the
+    /// request. This motor then hears no more of the drive: make another motor.
     ///
     /// # Errors
     /// [`ConfigError::Range`] for another id, [`ConfigError::Conflict`] for the id of the host.
@@ -238,6 +239,7 @@ impl DriveProtocol for Motor {
     }
 
     fn control(&mut self, order: Order) -> CanFrame {
+        self.once = None;
         let shaft = (self.angle(), self.velocity());
         let command = self.drive.and_then(|_| self.mode.command(order, shaft, &self.model));
         match command {

@@ -388,19 +388,28 @@ fn a_cybergear_is_never_told_to_store() {
     assert_eq!(bench.drive.bit_rate(), 1);
 }
 
+/// The joint may be driven elsewhere before the motor is disarmed: the zero would be there.
 #[test]
-fn the_zero_and_the_id_are_set_while_the_motor_is_disarmed_only() {
+fn a_driven_motor_forgets_a_zero_and_an_id_and_a_disarmed_one_sets_them() {
     let mut bench = Bench::armed(operation());
     bench.drive.shaft_mut().set_angle(2.0);
     bench.steps(300, |bench| _ = bench.own.set_torque(0.0));
     let here = bench.drive.shaft().angle_rad();
-    bench.own.motor_mut().set_zero();
-    bench.steps(100, |bench| {
+    let driven = |bench: &mut Bench| {
         _ = bench.own.set_torque(0.0);
-        assert!(bench.frames.iter().all(|frame| kind(frame) != 6));
-    });
-    assert!((bench.drive.shaft().angle_rad() - here).abs() < 0.5);
+        assert!(bench.frames.iter().all(|frame| ![6, 7].contains(&kind(frame))));
+    };
+    let disarmed = |bench: &mut Bench| {
+        assert!(bench.frames.iter().all(|frame| ![6, 7].contains(&kind(frame))));
+    };
+    bench.own.motor_mut().set_zero();
+    bench.steps(100, driven);
+    bench.own.motor_mut().set_id(0x55).unwrap();
+    bench.steps(100, driven);
     bench.own.disarm();
+    bench.steps(100, disarmed);
+    assert!((bench.drive.shaft().angle_rad() - here).abs() < 0.5);
+    bench.own.motor_mut().set_zero();
     bench.steps(100, |_| {});
     assert!(bench.drive.shaft().angle_rad().abs() < 0.5, "{}", bench.drive.shaft().angle_rad());
     assert!(bench.own.motor_mut().set_id(0).is_err() && bench.own.motor_mut().set_id(128).is_err());
