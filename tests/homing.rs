@@ -8,7 +8,7 @@ use drivetrain::encoder::Position;
 use drivetrain::motor::{Devices, HomingStep, Link, StopHoming};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{Fault, MotorConfig, MotorKey, Simulation};
-use drivetrain::time::{Duration, Instant};
+use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity, Current};
 
 /// A per rad/s, A per rad: presses within a third of a second.
@@ -182,4 +182,21 @@ fn each_failure_is_told_and_the_motor_relaxed() {
     let outcome = home(&world, key, false, config(-30.0));
     assert_eq!(outcome.result, HomingStep::LostFeedback);
     assert!((510..=512).contains(&outcome.took_ms) && outcome.relaxed, "{outcome:?}");
+}
+
+/// The shaft breaks loose from friction, turns by half a radian while the loop stands, and presses again: nobody saw it stand.
+#[test]
+fn a_pause_of_the_loop_is_no_standstill() {
+    for (pause_ms, longer_ms) in [(20, 0), (21, 100), (100, 100)] {
+        let mut homing = StopHoming::new(AngularVelocity::from_rad_per_s(-2.0), 3.0).unwrap();
+        let mut finds = |radians: f32, effort: f32, ms: u64| {
+            let position = Position::from_angle(Angle::from_radians(radians));
+            let tick = Tick::new(Instant::from_micros(1_000 * ms), 0.001);
+            let step = homing.step(Some((position, AngularVelocity::ZERO, effort)), tick);
+            matches!(step, HomingStep::SetPresentPosition(_))
+        };
+        assert!(!finds(0.0, 0.0, 1) && !(2..=90).any(|ms| finds(0.0, -3.1, ms)));
+        let found = (90 + pause_ms..).find(|ms| finds(-0.5, -3.1, *ms));
+        assert_eq!(found, Some(90 + pause_ms + longer_ms), "after a pause of {pause_ms} ms");
+    }
 }

@@ -144,7 +144,12 @@ pub struct StopHoming {
     back_off: Angle,
     phase: Phase,
     started: Option<Instant>,
+    /// The time of the step before.
+    stepped: Option<Instant>,
 }
+
+/// After a longer step, the shaft is not known to have stood meanwhile.
+const LONGEST_STEP: Duration = Duration::from_millis(20);
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -183,6 +188,7 @@ impl StopHoming {
             back_off: Angle::ZERO,
             phase: Phase::Start,
             started: None,
+            stepped: None,
         })
     }
 
@@ -257,7 +263,8 @@ impl StopHoming {
     ///
     /// The position counts over many turns. The effort is the measured current of the motor in amperes, or its torque in newton metres.
     ///
-    /// Call this in each tick from the first to the last. Time that goes back counts as standing.
+    /// Call this in each tick from the first to the last. After a step of more than 20 ms the window begins anew, for nothing is known of
+    /// the shaft meanwhile: a loop slower than 50 Hz finds no stop. Time that goes back counts as standing.
     pub fn step(
         &mut self,
         shaft: Option<(Position, AngularVelocity, f32)>,
@@ -265,6 +272,8 @@ impl StopHoming {
     ) -> HomingStep {
         let now = tick.now();
         let started = *self.started.get_or_insert(now);
+        let before = self.stepped.replace(now);
+        let is_known = before.is_some_and(|before| now.since(before) <= LONGEST_STEP);
         if let Phase::Over(last) = self.phase {
             return last;
         }
@@ -276,7 +285,9 @@ impl StopHoming {
         }
         match self.phase {
             Phase::Start => self.approach(shaft, shaft.0, None, now),
-            Phase::Approach(from, pressing) => self.approach(shaft, from, pressing, now),
+            Phase::Approach(from, pressing) => {
+                self.approach(shaft, from, pressing.filter(|_| is_known), now)
+            }
             Phase::Set => self.back_off(shaft.0, shaft.0),
             Phase::BackOff(from) => self.back_off(shaft.0, from),
             Phase::Over(last) => last,
@@ -397,7 +408,9 @@ mod tests {
             let mut step = |radians: f32, ms| {
                 homing.step(at(radians * direction, 0.0, 9.0 * direction), tick(ms))
             };
-            _ = step(0.0, 0);
+            for ms in (0..100).step_by(20) {
+                assert!(matches!(step(0.0, ms), HomingStep::Drive(_)));
+            }
             assert!(matches!(step(0.0, 100), HomingStep::SetPresentPosition(_)));
             for (ms, radians) in [(101, 0.0), (102, 0.2), (103, -0.09)] {
                 assert!(matches!(step(radians, ms), HomingStep::Drive(_)), "{radians} further on");
