@@ -28,7 +28,7 @@ run from power-on, and its trace has to be the same, bit for bit.
 * Zeros after: the time from the fault, or from the end of a fault of the line, until the first frame of zeros after which no
   other frame follows; where one motor fails and the others go on, the first from which on its own word is zero. For power-on it is the
   time from reset to the first frame. A dash: the robot goes on, or no zeros are asked for. A joint of the snake robot rests when its
-  "disable" was sent: the time is that of the last joint. Without IMU, a chassis is stopped by its wheels: the time is that until they stand.
+  "disable" was sent: the time is that of the last joint. Without IMU or remote control, a chassis is stopped by its wheels: the time is that until they stand.
 * Stale: frames on the wire that are not zero and that waited in the controller for more than a cycle. The age in a queue before it is
   not seen, except by the words in the row `transmit starved`.
 

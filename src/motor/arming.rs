@@ -283,8 +283,8 @@ impl core::fmt::Display for WrongSetting {
 
 /// The switch by which a person arms a robot: only its turn from off to on does.
 ///
-/// The position is unknown while a remote control is not heard. A robot that was on [brakes](SwitchOrder::Brake) then for a second, and is
-/// disarmed: a stop of category 1 in IEC 60204-1, where a robot that is disarmed at once rolls on for metres. A switch that is on at
+/// The position is unknown while a remote control is not heard. If the switch was turned on before, the robot [brakes](SwitchOrder::Brake)
+/// for a second, and is disarmed: a stop of category 1 in IEC 60204-1, where a robot that is disarmed at once rolls on for metres. A switch that is on at
 /// power-on, after the reset of a watchdog, or when the remote control is heard again, arms nothing until it was off.
 ///
 /// # Examples
@@ -361,9 +361,10 @@ pub enum SwitchOrder {
     Arm,
     /// The switch is on as before: armed motors stay armed, and others disarmed.
     Keep,
-    /// The position of a switch that was on is not known: armed motors stay armed, and get the targets of a robot that stands.
+    /// The position of a switch that was turned on was lost less than a second ago: armed motors stay armed, and get the targets of a robot
+    /// that stands.
     Brake,
-    /// The switch is off, or its position was not known for a second.
+    /// The switch is off; its position is not known, and it was not turned on before; or its position was lost a second ago.
     Disarm,
 }
 

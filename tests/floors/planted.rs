@@ -15,8 +15,12 @@ fn found_with(file: &str, lines: &str) -> Vec<String> {
 }
 
 /// File, and a rule.
-const RULES: [(&str, &str); 42] = [
+const RULES: [(&str, &str); 43] = [
     // A motor trips by a flag.
+    (
+        "motor/actuator/update.rs",
+        "fn f(guard: &mut Guard, is_wrong: bool, now: Instant) { if is_wrong { guard.lose_zero(now) } }",
+    ),
     (
         "dji/slot/target.rs",
         "fn f(slot: &mut Slot, is_wrong: bool) { if is_wrong { slot.guard.trip() } }",

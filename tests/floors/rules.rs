@@ -179,11 +179,13 @@ const COUNTS: [(&str, &str, &[&str]); 24] = [
 ];
 
 /// Calls by which a motor trips, by file: how many, and why.
-const TRIPS: [(&str, usize, &str); 6] = [
+const TRIPS: [(&str, usize, &str); 8] = [
     ("dji/device.rs", 1, "the runner trips all motors"),
     ("dji/slot/health.rs", 1, "a condition relaxes, as its configuration says"),
     ("motor/actuator/device.rs", 1, "the runner trips the motor"),
     ("motor/actuator/update.rs", 1, "the drive started again, or has a wrong setting"),
+    ("motor/actuator/update.rs", 1, "the joint lost its zero"),
+    ("snake/slot/health.rs", 1, "the same, of a joint"),
     ("snake/slot/health.rs", 1, "the drive is in an unexpected state"),
     ("snake/slot/health.rs", 1, "a joint that stalls relaxes, as its configuration says"),
 ];
@@ -405,10 +407,9 @@ fn findings(folder: &str, files: &Files, used: &mut BTreeSet<String>) -> Vec<Str
         if text.contains("is_hold()") && !asks {
             found.push(format!("{file} has its own rule for a held update"));
         }
-        let trips = tokens.windows(3).filter(|call| {
-            call[0] == "."
-                && ["trip", "relax_until_armed"].contains(&call[1].as_str())
-                && call[2] == "("
+        let trips = tokens.windows(4).filter(|call| {
+            let is_call = call[0] == "guard" && call[1] == "." && call[3] == "(";
+            is_call && ["trip", "relax_until_armed", "lose_zero"].contains(&call[2].as_str())
         });
         let (trips, rows) = (trips.count(), TRIPS.iter().filter(|(name, ..)| name == file));
         if trips != rows.map(|(_, trips, _)| trips).sum() {

@@ -34,7 +34,8 @@ pub struct Robot<P, K> {
     pub base: Base,
     pub turret: Turret,
     switch: ArmingSwitch,
-    brakes: bool, // the switch is not heard
+    brakes: bool, // the remote control was lost less than a second ago
+    angle: Angle, // of the gimbal
 }
 
 impl<P: Port, K: Clock + Copy> Robot<P, K> {
@@ -49,7 +50,7 @@ impl<P: Port, K: Clock + Copy> Robot<P, K> {
         let (base, turret) = (Base::new(&mut wheels)?, Turret::new(&mut gimbal)?);
         let lower = Runner::new(lower, clock, wheels).with_emergency_stop(stop);
         let upper = Runner::new(upper, clock, gimbal).with_emergency_stop(stop);
-        Ok(Self { lower, upper, base, turret, switch: ArmingSwitch::new(), brakes: false })
+        Ok(Self { lower, upper, base, turret, switch: ArmingSwitch::new(), brakes: false, angle: Angle::ZERO })
     }
 
     /// Runs the steps that are due. `limit` sees the commands of the wheels before they are sent.
@@ -78,8 +79,11 @@ impl<P: Port, K: Clock + Copy> Robot<P, K> {
             self.lower.tick_limited(tick, |bus| limit(bus, tick));
         }
         if let Some(tick) = self.upper.due() {
+            if !self.brakes && wish.is_on.is_some() {
+                self.angle = wish.angle; // not heard, the gimbal stays
+            }
             let order = if self.brakes { ShooterOrder::Rest } else { wish.order };
-            self.turret.drive(self.upper.device_mut(), (wish.angle, order, wish.heat), tick);
+            self.turret.drive(self.upper.device_mut(), (self.angle, order, wish.heat), tick);
             self.upper.tick(tick);
         }
         refusal

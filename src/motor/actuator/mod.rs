@@ -190,9 +190,12 @@ impl<M: DriveProtocol> Actuator<M> {
     /// Makes the present angle of the joint so much; the shaft follows its target as before, unless the angle is beyond a soft limit: the joint
     /// then moves back as after arming.
     ///
-    /// A drive without [`Capability::AbsoluteAngle`] counts from another angle when it has lost its supply. Once no feedback was taken for
-    /// 100 ms, for less where it is offline sooner, for longer where it is late only then, or an angle is further away than the shaft turned since the feedback before, the
-    /// zero is lost. A drive with [`Capability::AbsoluteAngle`] loses the zero only by an angle that jumps by no whole turn without such a silence. The motor trips, the joint has no angle, and targets with an angle are refused as [`TargetError::NotHomed`], until
+    /// A drive without [`Capability::AbsoluteAngle`] counts from another angle when it has lost its supply. Its zero is lost after a silence of
+    /// 100 ms, and when an angle is further away than the shaft can have turned since the feedback before. A silence that takes the motor
+    /// offline counts too if shorter, and one in which feedback is not yet late does not count. A drive with [`Capability::AbsoluteAngle`]
+    /// loses its zero by an angle alone that jumps by no whole turn without such a silence.
+    ///
+    /// Without its zero, the motor trips, the joint has no angle, and targets with an angle are refused as [`TargetError::NotHomed`], until
     /// this is called again. A joint that was never given a zero counts as its drive, and has none to lose.
     ///
     /// # Errors

@@ -12,9 +12,9 @@
 //! | is there a target that is not expired? | `MotorGuard::age` | relaxed |
 //! | how far is the output range open? | `MotorGuard::share` | that share of the full command |
 //!
-//! The [health](super::HealthConfig) of a family finds faults, heat and a stall, and [`DeviceGuard::is_alone`] ends a second master. Each
-//! acts by [`MotorGuard::trip`]. The tables
-//! of links and of arming, with all transitions, stand in the documentation of [`motor`](super#states).
+//! The [health](super::HealthConfig) of a family finds faults, heat and a stall, and says what a second master does; each acts by
+//! [`MotorGuard::trip`]. [`DeviceGuard::is_alone`] says when a second master is gone. The tables of links and of arming, with all
+//! transitions, stand in the documentation of [`motor`](super#states).
 //!
 //! Times of a motor are stamps of 32 bits. Ages of several motors are compared together: no motor is checked again before the
 //! greatest age can have exceeded its limit.

@@ -114,7 +114,7 @@ impl Robot {
         self.chassis.drive(bus, self.wheels, tick);
     }
 
-    /// Returns what the robot does.
+    /// Returns the mode of the switch; a robot that is not armed rests in each.
     pub fn mode(&self) -> Mode {
         self.mode
     }

@@ -1,10 +1,10 @@
 //! A sentry on a RoboMaster development board C (STM32F407IG): embassy, one task a part of the robot, topics between them.
 //!
 //! ```text
-//! hear_remote ──REMOTE──> steer, 500 Hz ──MOTION──> control, 1 kHz ──CHASSIS_YAW──> steer
-//! hear_imu ───ATTITUDE──> aim, 1 kHz ─────AIM─────>               ──ARMED────────> aim
-//!             REMOTE────> shoot, 500 Hz ──SHOT────>               ──BARREL───────> shoot
-//!                                                  EVENTS ──> log, lamps
+//! hear_remote ──REMOTE───> control, 1 kHz ──PILOT, CHASSIS_YAW──> steer, 500 Hz ──MOTION──> control
+//! hear_imu ────ATTITUDE──> aim, 1 kHz <────PILOT, ARMED────────── control;    aim ──AIM─────> control
+//!                          shoot, 500 Hz <──PILOT, BARREL───────── control;  shoot ──SHOT────> control
+//!                                                         EVENTS ──> log, lamps
 //! ```
 //!
 //! Topics are those of `embassy-sync`: a `Watch` holds the last value, a `PubSubChannel` each one. A target is set once for each
@@ -32,6 +32,7 @@ use drivetrain::dji::Bus;
 use drivetrain::motor::SwitchOrder;
 use drivetrain::runner::{NbAbort, Runner};
 use drivetrain::time::{Instant, Tick};
+use drivetrain::wire::dbus::Remote;
 use embassy_executor::Spawner;
 use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::usart::{self, Parity, UartRx};
@@ -41,7 +42,7 @@ use embassy_time::{Duration, Ticker};
 use halves::Halves;
 use panic_probe as _;
 use pilot::sentry::{Event, Sentry};
-use topics::{AIM, ARMED, BARREL, CHASSIS_YAW, EVENTS, MOTION, REMOTE, SHOT};
+use topics::{AIM, ARMED, BARREL, CHASSIS_YAW, EVENTS, MOTION, PILOT, REMOTE, SHOT};
 
 bind_interrupts!(struct Interrupts {
     USART3 => usart::InterruptHandler<peripherals::USART3>;
@@ -85,6 +86,9 @@ impl Robot {
         let remote = heard.map_or_else(Default::default, |heard| parts::fresh(heard, tick.now()));
         let events = EVENTS.immediate_publisher();
         let order = self.sentry.order(&remote, tick);
+        // While it brakes, the sentry stands, looks where it looked and shoots nothing, whatever is heard again.
+        let counts = if order == SwitchOrder::Brake { Remote::default() } else { remote };
+        PILOT.sender().send(counts);
         match order {
             SwitchOrder::Arm => {
                 if !self.arm(tick) {
@@ -95,13 +99,11 @@ impl Robot {
             SwitchOrder::Keep | SwitchOrder::Brake | SwitchOrder::Disarm => self.rest(),
         }
         let (first, second) = (self.first.device_mut(), self.second.device_mut());
-        // While the remote control is lost, the sentry stands and shoots nothing.
-        let drives = order != SwitchOrder::Brake;
-        self.sentry.roll(first, MOTION.try_get().filter(|_| drives), tick);
+        self.sentry.roll(first, MOTION.try_get(), tick);
         if let Some(aim) = AIM.try_get() {
             self.sentry.aim(first, second, &aim);
         }
-        if let Some(shot) = SHOT.try_take().filter(|_| drives) {
+        if let Some(shot) = SHOT.try_take() {
             self.sentry.shoot(second, shot);
         }
         let is_armed = self.is_armed();

@@ -1,6 +1,8 @@
 //! The tasks of the sentry beside the control loop: its senses, and what each part wants.
 
-use crate::topics::{AIM, ARMED, ATTITUDE, BARREL, CHASSIS_YAW, EVENTS, MOTION, REMOTE, SHOT};
+use crate::topics::{
+    AIM, ARMED, ATTITUDE, BARREL, CHASSIS_YAW, EVENTS, MOTION, PILOT, REMOTE, SHOT,
+};
 use c_board_embassy::now;
 use drivetrain::time::{Duration, Instant};
 use drivetrain::wire::Deframer;
@@ -58,7 +60,7 @@ pub async fn steer() {
     loop {
         wake.next().await;
         let now = now();
-        let remote = REMOTE.try_get().map_or_else(Remote::default, |heard| fresh(heard, now));
+        let remote = PILOT.try_get().unwrap_or_default();
         let yaw = CHASSIS_YAW.try_get().flatten();
         topic.send((steering.update(&remote, yaw, PERIOD_S), now));
     }
@@ -72,7 +74,7 @@ pub async fn aim() {
     loop {
         wake.next().await;
         let Some(seen) = ATTITUDE.try_get() else { continue };
-        let remote = REMOTE.try_get().map_or_else(Remote::default, |heard| fresh(heard, now()));
+        let remote = PILOT.try_get().unwrap_or_default();
         let is_armed = ARMED.try_get() == Some(true);
         topic.send(aiming.update(&remote, seen, is_armed, PERIOD_S));
     }
@@ -87,7 +89,7 @@ pub async fn shoot() {
     loop {
         wake.next().await;
         let now = now();
-        let remote = REMOTE.try_get().map_or_else(Remote::default, |heard| fresh(heard, now));
+        let remote = PILOT.try_get().unwrap_or_default();
         let barrel = BARREL.try_get().unwrap_or_default();
         SHOT.signal(shooter.update(&remote, barrel, now));
         if shooter.is_jammed() && !was_jammed {

@@ -15,6 +15,8 @@ pub type Topic<T> = Watch<ThreadModeRawMutex, T, 2>;
 
 /// What the remote control shows, and when it was heard.
 pub static REMOTE: Topic<(Remote, Instant)> = Watch::new();
+/// What the remote control asks of the tasks: nothing when it is silent, and while the sentry brakes without it.
+pub static PILOT: Watch<ThreadModeRawMutex, Remote, 0> = Watch::new();
 /// What the IMU measures.
 pub static ATTITUDE: Topic<Attitude> = Watch::new();
 /// How the chassis is to move, and when that was decided.
