@@ -42,7 +42,7 @@ use core::marker::PhantomData;
 /// assert_eq!(format!("{frame:?}"), "200 [8] 03 33 00 00 00 00 00 00"); // 819 of 16384 = 1 A of 20 A
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-/// Takes 3544 bytes on a Cortex-M4F, with its 11 places (`docs/figures.md`).
+/// Takes 3552 bytes on a Cortex-M4F, with its 11 places (`docs/figures.md`).
 #[derive(Debug)]
 // The motors first: their addresses then need no offset.
 #[repr(C)]

@@ -122,7 +122,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
 
     /// Takes at most `budget` received frames from the driver; frames of others are dropped. Returns how many came.
     ///
-    /// Costs 558 instructions on a Cortex-M4F, for 8 frames of motors (`docs/figures.md`).
+    /// Costs 556 instructions on a Cortex-M4F, for 8 frames of motors (`docs/figures.md`).
     pub fn poll(&mut self, budget: usize) -> usize {
         self.poll_with(budget, |_| {})
     }
@@ -281,7 +281,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
 
     /// Runs one step: update, then send. Drops frames of others that the driver evicts.
     ///
-    /// Costs 648 instructions on a Cortex-M4F, with 8 speed loops (`docs/figures.md`).
+    /// Costs 650 instructions on a Cortex-M4F, with 8 speed loops (`docs/figures.md`).
     pub fn tick(&mut self, tick: Tick) {
         self.tick_with(tick, |_| {});
     }
