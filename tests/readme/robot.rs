@@ -53,7 +53,7 @@ fn robot(
             SwitchOrder::Arm if twist != Twist::ZERO => {} // a stick is held: off and on again
             SwitchOrder::Arm => runner.arm(tick).unwrap_or_else(|why| pilot.report(why)),
             SwitchOrder::Keep => {}
-            SwitchOrder::Brake => twist = Twist::ZERO, // for a second, while the remote control is not heard
+            SwitchOrder::Brake => twist = Twist::ZERO, // for a second from when the remote control is lost
             SwitchOrder::Disarm => runner.device_mut().disarm(),
         }
         if pilot.clears_stop() {
