@@ -1,4 +1,4 @@
-//! What each run has to come to: the rows of `docs/faults.md`, on this robot.
+//! The outcome of each run, as the rows of `docs/faults.md` demand it of this robot.
 
 use super::robot::{Event, HOST_DEADLINE};
 use super::simulation::{AGAIN_S, FAULT_S, HIT, Run, Sample, Trouble};
@@ -113,7 +113,7 @@ fn joint_is_lost(run: &Run, check: &mut impl FnMut(bool, String)) {
     check(homed, "its zero, in doubt since, was set again by the operator".to_owned());
 }
 
-/// The present position is the new zero: a jump of what is shown, and none of what moves.
+/// The present position becomes the new zero: the angle that is shown jumps, and the joint does not.
 fn zeroed_in_motion(run: &Run, check: &mut impl FnMut(bool, String)) {
     let zeroed = at_event(run, FAULT_S, |event| *event == Event::Zeroed);
     check(

@@ -22,7 +22,7 @@ pub(crate) const AGAIN_S: f32 = 5.6;
 /// The joint that is hit, by its index.
 pub(crate) const HIT: usize = 4;
 
-/// What can be made to go wrong.
+/// The faults that a run can have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Trouble {
     HostLineCut,

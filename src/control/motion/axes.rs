@@ -6,8 +6,8 @@ use crate::error::ConfigError;
 
 /// Motions of `N` axes that start together and end together.
 ///
-/// The axis that takes longest makes its fastest [`Motion`], and each other one the mean, with weights, of two motions of that duration: the
-/// longest way and the shortest one that its limits allow. Limits that hold in both hold in each mean of them, so a slower motion is
+/// The axis that takes longest makes its fastest [`Motion`]. Each other axis makes a weighted mean of two motions of the same duration: of the
+/// longest way and of the shortest way within its limits. Limits that hold in both hold in each mean of them, so a slower motion is
 /// always found. Between rest and rest it is the fastest one with all its rates lowered in proportion.
 ///
 /// A duration may be impossible for an axis whose target moves: too long to arrive and too short to come back. All axes then take the

@@ -70,7 +70,7 @@ pub struct Actuator<M> {
     motor: M,
     joint: Joint,
     watch: Watch,
-    /// What the drive is told in an update with a decision: less than the target while the output range opens, and at a soft limit.
+    /// The target as far as an update with a decision tells the drive: reduced while the output range opens, and at a soft limit.
     goal: Target,
     start: Start,
     /// This update offers a frame for the drive's power.
@@ -191,8 +191,8 @@ impl<M: DriveProtocol> Actuator<M> {
     /// then moves back as after arming.
     ///
     /// A drive without [`Capability::AbsoluteAngle`] counts from another angle when it has lost its supply. Its zero is lost after a silence of
-    /// 100 ms, and when an angle is further away than the shaft can have turned since the feedback before. A silence that takes the motor
-    /// offline counts too if shorter, and one in which feedback is not yet late does not count. A drive with [`Capability::AbsoluteAngle`]
+    /// 100 ms, and when an angle is further away than the shaft can have turned since the feedback before. A shorter silence
+    /// counts if the motor is offline in it, and a longer silence does not count if feedback is not late in it. A drive with [`Capability::AbsoluteAngle`]
     /// loses its zero by an angle alone that jumps by no whole turn without such a silence.
     ///
     /// Without its zero, the motor trips, the joint has no angle, and targets with an angle are refused as [`TargetError::NotHomed`], until
