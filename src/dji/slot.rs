@@ -317,19 +317,18 @@ impl Slot {
             Duty::Velocity => self.goal.rad_per_s(),
             Duty::Position => {
                 let way = self.shaft.way_to(self.goal.turns, self.goal.value);
-                match self.position.plain(way, velocity, step) {
-                    Ok(goal) => goal,
-                    Err(_) => return None,
-                }
+                self.position.plain((way, velocity), step).ok()?
             }
             Duty::Raw => return Some(saturate(self.goal.value, self.range)),
             // Out of line too: inline, every update of every motor would load a zero for these.
             Duty::Rest | Duty::First | Duty::Other => return None,
         };
-        Some(match self.speed.plain(goal, velocity, step) {
-            Ok(output) => free_to_raw(output, self.raw_per_unit),
-            Err(_) => self.follow_velocity(goal, velocity, dt_s),
-        })
+        let sample = self.speed.sample(goal, velocity, step);
+        let Ok(output) = self.speed.core.plain(sample, step) else {
+            return Some(self.follow_velocity(goal, velocity, dt_s));
+        };
+        self.speed.measurement = velocity;
+        Some(free_to_raw(output, self.raw_per_unit))
     }
 
     // Cold, so that the usual path runs straight on. Loops with options also come here, with no other cost.

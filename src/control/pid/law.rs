@@ -1,11 +1,9 @@
-//! The law of the controller, plain and in full.
+//! The law of the controller.
 //!
 //! ```text
-//! Pid::plain            error and rate from setpoint and measurement
-//!   └─ ErrorPid::plain  gains, integral limit, one output limit; refuses all else
-//! Pid::full             the same with circle, tracking, derivative of the error, feed-forward
-//!   └─ ErrorPid::full   every other option
-//!       └─ bound        limits, first calls, long steps, overflow
+//! step, step_error   error and rate of a sample
+//!   ├─ plain         gains, integral limit, one output limit; refuses all else
+//!   └─ full          every option
 //! ```
 
 use super::config::{DERIVATIVE_ON_ERROR, REST_DERIVATIVE, TRACK_OUTPUT};
@@ -14,13 +12,159 @@ use crate::control::number::finite;
 use crate::math::{self, limited};
 use crate::time::TimeStep;
 
+impl Pid {
+    /// Steps by a validated time step, and returns the output.
+    ///
+    /// Costs 30 instructions on a Cortex-M4F, with limits, while the output is free (`docs/figures.md`).
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::control::{Pid, PidConfig};
+    /// use drivetrain::time::TimeStep;
+    ///
+    /// let mut pid = Pid::new(PidConfig::new(2.0, 10.0, 0.0))?;
+    /// assert_eq!(pid.step(1.0, 0.0, &TimeStep::of(0.01)), 2.0); // P
+    /// assert_eq!(pid.step(1.0, 0.0, &TimeStep::of(0.01)), 2.1); // and 10/s for 10 ms
+    /// # Ok::<(), drivetrain::error::ConfigError>(())
+    /// ```
+    #[inline]
+    pub fn step(&mut self, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
+        let sample = self.sample(setpoint, measurement, step);
+        match self.core.plain(sample, step) {
+            Ok(output) => {
+                self.measurement = measurement;
+                output
+            }
+            Err(true) => self.full(step, sample.0, Some(measurement), sample),
+            Err(false) => self.full(step, setpoint, Some(measurement), sample),
+        }
+    }
+
+    /// Steps with a given error (from integers, on a circle) and the measured rate of change.
+    ///
+    /// D is `-kd * rate`, on the first call too. Period, tracking, feed-forward and the derivative of the error do not apply.
+    /// Everything else is as for [`step`](Self::step).
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::control::{Pid, PidConfig};
+    /// use drivetrain::time::TimeStep;
+    ///
+    /// let mut pid = Pid::new(PidConfig::new(10.0, 0.0, 0.5))?;
+    /// assert_eq!(pid.step_error(0.3, 2.0, &TimeStep::of(0.001)), 2.0); // 10 times 0.3, less 0.5 times 2
+    /// # Ok::<(), drivetrain::error::ConfigError>(())
+    /// ```
+    #[inline]
+    pub fn step_error(&mut self, error: f32, rate: f32, step: &TimeStep) -> f32 {
+        if let Ok(output) = self.core.plain((error, rate), step) {
+            self.measurement = UNKNOWN;
+            return output;
+        }
+        self.full(step, error, None, (error, rate))
+    }
+
+    /// The sample without the options of the setpoint.
+    #[inline(always)]
+    pub(crate) fn sample(&self, setpoint: f32, measured: f32, step: &TimeStep) -> Sample {
+        (setpoint - measured, (measured - self.measurement) * step.per_dt)
+    }
+
+    /// The law with all options, for a sample as the plain law takes it. Without a measurement the sample is given, and the options of
+    /// the setpoint do not apply. `valid` is finite if the setpoint is.
+    #[inline(never)]
+    fn full(&mut self, step: &TimeStep, valid: f32, measured: Option<f32>, sample: Sample) -> f32 {
+        let ((mut error, mut rate), mut feed_forward) = (sample, 0.0);
+        if let Some(measured) = measured {
+            // Bad arguments, an unknown measurement, a step that is not normal, overflow.
+            if !(error + rate).is_finite() {
+                if step.is_hold() || !valid.is_finite() || !measured.is_finite() {
+                    return self.refuse(!step.is_hold());
+                }
+                let rests = self.measurement == UNKNOWN || step.is_frozen();
+                self.core.options |= if rests { REST_DERIVATIVE } else { 0 };
+                // The rate of a circle that overflows is left to the limits.
+                (error, rate) = (finite(error), if self.way > 0.0 { rate } else { finite(rate) });
+            }
+            (error, rate) = self.shaped(measured, (error, rate), step);
+            feed_forward = self.feed_forward_of(measured + error);
+            self.measurement = measured;
+        } else {
+            if step.is_hold() || !error.is_finite() || !rate.is_finite() {
+                return self.refuse(false);
+            }
+            (self.measurement, self.tracking_rate) = (UNKNOWN, 0.0);
+            self.core.set_options(self.core.options & !REST_DERIVATIVE);
+            rate = if step.is_frozen() { self.core.rate } else { rate };
+        }
+        let (core, p) = (&self.core, &self.core.parameters);
+        if p.derivative_time_s > 0.0 {
+            rate = core.rate + step.dt_s / (step.dt_s + p.derivative_time_s) * (rate - core.rate);
+        }
+        let (proportional, growth) = core.weighted(error, step);
+        let (integral, pushed) = (core.integral + growth, proportional + feed_forward);
+        let wanted = pushed - p.kd * rate + integral;
+        let way = (wanted - core.output).abs();
+        let is_slow = way <= p.slew_per_s * step.dt_s || p.slew_per_s >= f32::MAX;
+        let is_within = wanted <= p.output_upper && wanted >= p.output_lower;
+        if is_slow && is_within && passes(integral, core.integral_limit_gate()) {
+            return self.core.keep(wanted, error, rate, integral);
+        }
+        let (output, rate, integral) = self.core.limit(pushed, rate, growth, step);
+        self.core.keep(output, error, rate, integral)
+    }
+
+    /// The sample as circle, tracking and the derivative of the error make it.
+    #[inline(always)]
+    fn shaped(&mut self, measured: f32, (mut error, mut rate): Sample, step: &TimeStep) -> Sample {
+        if self.way > 0.0 {
+            error = math::shortest(error, self.way);
+            let travel = measured - self.measurement;
+            if travel.abs() >= self.way {
+                rate = math::shortest(travel, self.way) * step.per_dt;
+            }
+        } else if self.way < 0.0 {
+            // The tracked setpoint moves on: the linear tracking differentiator by Euler's rule. The setpoint of the last step is
+            // `measurement + error`, so only its rate has to be stored.
+            let (r, pace) = (-self.way, self.tracking_rate);
+            let is_known = self.measurement != UNKNOWN;
+            let last = if is_known { self.core.error - (measured - self.measurement) } else { 0.0 };
+            let (longest_s, pull) = (1.0 / r, r * (last - error) + 2.0 * pace);
+            let dt_s = if step.dt_s > longest_s { longest_s } else { step.dt_s };
+            self.tracking_rate = finite(pace - dt_s * (r * pull));
+            error = finite(last + dt_s * pace);
+        }
+        if self.core.options & REST_DERIVATIVE != 0 {
+            rate = self.core.rate;
+            self.core.set_options(self.core.options & !REST_DERIVATIVE);
+        } else if self.core.options & DERIVATIVE_ON_ERROR != 0 {
+            let (way, half) = (self.core.error - error, self.way);
+            rate = step.per_dt * if half > 0.0 { math::shortest(way, half) } else { way };
+        }
+        (error, rate)
+    }
+
+    /// Holds the output and counts the step. If time passed without a measurement, D rests in the next good step: the travel
+    /// spans more than one step.
+    fn refuse(&mut self, rests: bool) -> f32 {
+        self.core.rejected = self.core.rejected.saturating_add(1);
+        self.core.set_options(self.core.options | if rests { REST_DERIVATIVE } else { 0 });
+        self.core.output
+    }
+
+    /// Keeps the integral within a range of the output around zero: the part passed by a limit beyond this loop, since a larger
+    /// integral would be wound up.
+    pub(crate) const fn keep_integral_between(&mut self, lowest: f32, highest: f32) {
+        self.core.integral = limited(self.core.integral, lowest, highest);
+    }
+}
+
 impl ErrorPid {
     /// The plain law: gains, integral limit, one output limit.
     ///
     /// # Errors
-    /// If the step needs more, nothing changes; the value tells whether the error is known to be finite.
+    /// If the step needs more, nothing changes; the value tells whether the sample is known to be finite.
     #[inline(always)]
-    pub(crate) fn plain(&mut self, error: f32, rate: f32, step: &TimeStep) -> Plain {
+    pub(crate) fn plain(&mut self, (error, rate): Sample, step: &TimeStep) -> Result<f32, bool> {
         let growth = self.parameters.ki * step.half_dt_s * (error + self.error);
         let mut integral = self.integral + growth;
         // With options, NaN and infinity nothing passes.
@@ -39,16 +183,12 @@ impl ErrorPid {
         Ok(self.keep(output, error, rate, integral))
     }
 
-    /// The law with all options but those of the setpoint, for a finite error.
+    /// P and the growth of the integral, as weights and dead band leave them. The growth is not finite in a first call and in a frozen step,
+    /// whatever the weight.
     #[inline(always)]
-    fn full(&mut self, error: f32, mut rate: f32, feed_forward: f32, step: &TimeStep) -> f32 {
+    fn weighted(&self, error: f32, step: &TimeStep) -> (f32, f32) {
         let p = &self.parameters;
-        if p.derivative_time_s > 0.0 {
-            let gain = step.dt_s / (step.dt_s + p.derivative_time_s);
-            rate = self.rate + gain * (rate - self.rate);
-        }
         let (size, mut proportional) = (error.abs(), p.kp * error);
-        // Not finite in a first call and in a frozen step, whatever the weight.
         let mut growth = p.ki * step.half_dt_s * (error + self.error);
         if size > p.full_rate_below {
             let weight = (p.no_rate_above - size) / (p.no_rate_above - p.full_rate_below);
@@ -61,21 +201,12 @@ impl ErrorPid {
             // Not simply zero: what is not finite must show.
             growth = if shrinks { growth } else { growth * 0.0 };
         }
-        let integral = self.integral + growth;
-        let pushed = proportional + feed_forward;
-        let wanted = pushed - p.kd * rate + integral;
-        let way = (wanted - self.output).abs();
-        let is_slow = way <= p.slew_per_s * step.dt_s || p.slew_per_s >= f32::MAX;
-        let is_within = wanted <= p.output_upper && wanted >= p.output_lower;
-        if is_slow && is_within && passes(integral, self.integral_limit_gate()) {
-            return self.keep(wanted, error, rate, integral);
-        }
-        self.bound(error, rate, pushed, growth, step)
+        (proportional, growth)
     }
 
-    /// Ends a step of which a part is not finite or at a limit; `pushed` is P and feed-forward.
-    #[inline(never)]
-    fn bound(&mut self, error: f32, rate: f32, pushed: f32, growth: f32, step: &TimeStep) -> f32 {
+    /// The output, the rate and the integral of a step of which a part is not finite or at a limit; `pushed` is P and feed-forward.
+    #[inline(always)]
+    fn limit(&mut self, pushed: f32, rate: f32, growth: f32, step: &TimeStep) -> (f32, f32, f32) {
         let p = &self.parameters;
         let limit = limit_of(self.integral_limit_gate());
         let (mut memory, mut rate, mut growth) = (self.integral, rate, growth);
@@ -106,7 +237,7 @@ impl ErrorPid {
         } else if excess * (integral - memory) > 0.0 {
             integral = memory;
         }
-        self.keep(output, error, rate, integral)
+        (output, rate, integral)
     }
 
     /// Ends a step, and returns its output.
@@ -117,142 +248,8 @@ impl ErrorPid {
     }
 }
 
-impl Pid {
-    /// Steps by a validated time step, and returns the output.
-    ///
-    /// Costs 30 instructions on a Cortex-M4F, with limits, while the output is free (`docs/figures.md`).
-    ///
-    /// # Examples
-    /// ```
-    /// use drivetrain::control::{Pid, PidConfig};
-    /// use drivetrain::time::TimeStep;
-    ///
-    /// let mut pid = Pid::new(PidConfig::new(2.0, 10.0, 0.0))?;
-    /// assert_eq!(pid.step(1.0, 0.0, &TimeStep::of(0.01)), 2.0); // P
-    /// assert_eq!(pid.step(1.0, 0.0, &TimeStep::of(0.01)), 2.1); // and 10/s for 10 ms
-    /// # Ok::<(), drivetrain::error::ConfigError>(())
-    /// ```
-    #[inline]
-    pub fn step(&mut self, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
-        let (error, travel) = (setpoint - measurement, measurement - self.measurement);
-        let rate = travel * step.per_dt;
-        match self.plain(setpoint, measurement, step) {
-            Ok(output) => output,
-            Err(true) => self.full(error, measurement, error, rate, step),
-            Err(false) => self.full(setpoint, measurement, error, rate, step),
-        }
-    }
-
-    /// Steps with a given error (from integers, on a circle) and the measured rate of change.
-    ///
-    /// D is `-kd * rate`, on the first call too. Period, tracking, feed-forward and the derivative of the error do not apply.
-    /// Everything else is as for [`step`](Self::step).
-    ///
-    /// # Examples
-    /// ```
-    /// use drivetrain::control::{Pid, PidConfig};
-    /// use drivetrain::time::TimeStep;
-    ///
-    /// let mut pid = Pid::new(PidConfig::new(10.0, 0.0, 0.5))?;
-    /// assert_eq!(pid.step_error(0.3, 2.0, &TimeStep::of(0.001)), 2.0); // 10 times 0.3, less 0.5 times 2
-    /// # Ok::<(), drivetrain::error::ConfigError>(())
-    /// ```
-    #[inline]
-    pub fn step_error(&mut self, error: f32, rate: f32, step: &TimeStep) -> f32 {
-        if let Ok(output) = self.core.plain(error, rate, step) {
-            self.measurement = UNKNOWN;
-            return output;
-        }
-        self.given(error, rate, step)
-    }
-
-    /// The step of any controller with a given error.
-    #[inline(never)]
-    fn given(&mut self, error: f32, rate: f32, step: &TimeStep) -> f32 {
-        if step.is_hold() || !error.is_finite() || !rate.is_finite() {
-            return self.refuse(false);
-        }
-        self.measurement = UNKNOWN;
-        self.tracking_rate = 0.0;
-        self.core.set_options(self.core.options & !REST_DERIVATIVE);
-        let rate = if step.is_frozen() { self.core.rate } else { rate };
-        self.core.full(error, rate, 0.0, step)
-    }
-
-    /// The plain step.
-    ///
-    /// # Errors
-    /// As [`ErrorPid::plain`].
-    #[inline(always)]
-    pub(crate) fn plain(&mut self, setpoint: f32, measured: f32, step: &TimeStep) -> Plain {
-        let (error, travel) = (setpoint - measured, measured - self.measurement);
-        let output = self.core.plain(error, travel * step.per_dt, step)?;
-        self.measurement = measured;
-        Ok(output)
-    }
-
-    /// The step of any controller, with error and rate as the plain step takes them: applies the options of the setpoint. `valid`
-    /// is finite if the setpoint is.
-    #[inline(never)]
-    fn full(&mut self, valid: f32, measured: f32, error: f32, rate: f32, step: &TimeStep) -> f32 {
-        let (mut error, mut rate) = (error, rate);
-        // Bad arguments, an unknown measurement, a step that is not normal, overflow.
-        if !(error + rate).is_finite() {
-            if step.is_hold() || !valid.is_finite() || !measured.is_finite() {
-                return self.refuse(!step.is_hold());
-            }
-            let rests = self.measurement == UNKNOWN || step.is_frozen();
-            self.core.options |= if rests { REST_DERIVATIVE } else { 0 };
-            // The rate of a circle that overflows is left to `bound`.
-            (error, rate) = (finite(error), if self.way > 0.0 { rate } else { finite(rate) });
-        }
-        if self.way > 0.0 {
-            error = math::shortest(error, self.way);
-            let travel = measured - self.measurement;
-            if travel.abs() >= self.way {
-                rate = math::shortest(travel, self.way) * step.per_dt;
-            }
-        } else if self.way < 0.0 {
-            // The tracked setpoint moves on: the linear tracking differentiator by Euler's rule. The setpoint of the last step is
-            // `measurement + error`, so only its rate has to be stored.
-            let (r, pace) = (-self.way, self.tracking_rate);
-            let is_known = self.measurement != UNKNOWN;
-            let last = if is_known { self.core.error - (measured - self.measurement) } else { 0.0 };
-            let (longest_s, pull) = (1.0 / r, r * (last - error) + 2.0 * pace);
-            let dt_s = if step.dt_s > longest_s { longest_s } else { step.dt_s };
-            self.tracking_rate = finite(pace - dt_s * (r * pull));
-            error = finite(last + dt_s * pace);
-        }
-        if self.core.options & (DERIVATIVE_ON_ERROR | REST_DERIVATIVE) != 0 {
-            if self.core.options & REST_DERIVATIVE != 0 {
-                rate = self.core.rate;
-                self.core.set_options(self.core.options & !REST_DERIVATIVE);
-            } else {
-                let (way, half) = (self.core.error - error, self.way);
-                rate = step.per_dt * if half > 0.0 { math::shortest(way, half) } else { way };
-            }
-        }
-        self.measurement = measured;
-        self.core.full(error, rate, self.feed_forward_of(measured + error), step)
-    }
-
-    /// Holds the output and counts the step. If time passed without a measurement, D rests in the next good step: the travel
-    /// spans more than one step.
-    fn refuse(&mut self, rests: bool) -> f32 {
-        self.core.rejected = self.core.rejected.saturating_add(1);
-        self.core.set_options(self.core.options | if rests { REST_DERIVATIVE } else { 0 });
-        self.core.output
-    }
-
-    /// Keeps the integral within a range of the output around zero: the part passed by a limit beyond this loop, since a larger
-    /// integral would be wound up.
-    pub(crate) const fn keep_integral_between(&mut self, lowest: f32, highest: f32) {
-        self.core.integral = limited(self.core.integral, lowest, highest);
-    }
-}
-
-/// The output; or whether the error is known to be finite.
-pub(crate) type Plain = Result<f32, bool>;
+/// The error and its measured rate.
+pub(crate) type Sample = (f32, f32);
 
 /// Tells whether a value is within the limit of a [`gate`](super::gate): one integer comparison.
 const fn passes(value: f32, gate: u32) -> bool {
@@ -267,14 +264,17 @@ mod tests {
     use proptest::prelude::*;
 
     fn stepped(pid: &mut Pid, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
-        let plain =
-            if pid.core.is_plain() { pid.plain(setpoint, measurement, step).ok() } else { None };
+        let sample = pid.sample(setpoint, measurement, step);
+        let plain = if pid.core.is_plain() { pid.core.plain(sample, step).ok() } else { None };
+        if plain.is_some() {
+            pid.measurement = measurement;
+        }
         plain.unwrap_or_else(|| pid.step(setpoint, measurement, step))
     }
 
     fn stepped_by(pid: &mut Pid, error: f32, rate: f32, step: &TimeStep) -> f32 {
         let mut part = pid.core;
-        let plain = part.plain(error, rate, step).ok();
+        let plain = part.plain((error, rate), step).ok();
         let output =
             plain.unwrap_or_else(|| part.as_pid(|whole| whole.step_error(error, rate, step)));
         let whole = pid.step_error(error, rate, step);

@@ -82,7 +82,7 @@ use config::{
 #[repr(C)]
 pub struct Pid {
     // Beside the error and the rate of the core: a step stores all three by one instruction.
-    measurement: f32,
+    pub(crate) measurement: f32,
     /// The part for errors that are formed elsewhere.
     pub(crate) core: ErrorPid,
     /// Half of the period; or the speed of tracking, negative.
