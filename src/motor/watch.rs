@@ -16,8 +16,8 @@ const PERIOD_US: u64 = 8_192;
 /// make one tick in eight long.
 const PARTS: u64 = 8;
 
-/// A motor that is driven is not counted.
-const UNCOUNTED: u16 = u16::MAX;
+/// So many frames to a drive are compared with its answers: more than half as many again come from two drives.
+const ASKED: u16 = 64;
 
 /// Checks one motor outside the slots of a bus: counts its frames, and judges its vitals.
 #[derive(Debug, Clone, Copy)]
@@ -26,8 +26,9 @@ pub(crate) struct Watch {
     monitor: Monitor,
     traffic: Traffic,
     window_from: Instant,
-    /// Frames of the present window that the drive answers; [`UNCOUNTED`] if the motor was armed meanwhile.
+    /// Frames to the drive at rest that the drive answers with feedback, and the feedback since, until both are compared.
     asked: u16,
+    answered: u16,
     saturated: u16,
     error_code: u8,
     checked: Instant,
@@ -47,6 +48,7 @@ impl Watch {
             traffic: Traffic::NONE,
             window_from: Instant::START,
             asked: 0,
+            answered: 0,
             saturated: 0,
             error_code: 0,
             checked: Instant::START,
@@ -72,9 +74,13 @@ impl Watch {
     pub(crate) fn hear(&mut self, gap_us: Option<u32>, now: Instant) {
         match gap_us {
             Some(gap_us) => self.traffic.gap(gap_us),
-            None => self.window_from = now,
+            None => {
+                self.window_from = now;
+                (self.asked, self.answered) = (0, 0);
+            }
         }
         self.traffic.count();
+        self.answered = self.answered.saturating_add(1);
     }
 
     /// Returns the gap from which feedback lengthens the longest gap of the present window.
@@ -87,14 +93,14 @@ impl Watch {
         self.next
     }
 
-    /// Notes a frame to a drive that sends nothing but answers.
-    #[inline]
-    pub(crate) const fn ask(&mut self) {
-        self.asked = self.asked.saturating_add(1);
+    /// Notes so many frames to a drive at rest that sends nothing but answers.
+    pub(crate) const fn ask(&mut self, frames: u16) {
+        self.asked = self.asked.saturating_add(frames);
     }
 
-    /// Notes a command of another node, which relaxes the motor where a second master demands rest.
-    pub(crate) fn hear_rival(&self, guard: &mut Guard, now: Instant) {
+    /// Notes a command of another node, which relaxes the motor where a second master demands rest. The drive answers that node too.
+    pub(crate) fn hear_rival(&mut self, guard: &mut Guard, now: Instant) {
+        (self.asked, self.answered) = (0, 0);
         let before = guard.conditions();
         if !self.config.ignores(Condition::SecondMaster) {
             guard.note(Condition::SecondMaster, true, now);
@@ -110,7 +116,6 @@ impl Watch {
     /// Begins anew before the motor is driven.
     pub(crate) fn start(&mut self, guard: &mut Guard, motor: MotorName, now: Instant) {
         self.part = motor.id();
-        self.asked = UNCOUNTED;
         self.next = self.after(now);
         guard.latch(now, |latch| self.monitor.start(latch));
     }
@@ -135,10 +140,16 @@ impl Watch {
             return self.share;
         }
         let vitals = vitals();
-        self.traffic.add(guard.take_in_time());
-        let most_hz = self.most_answers_hz();
-        if self.traffic.end_window(&mut self.window_from, now, most_hz) {
-            self.end_window(guard, now);
+        let heard = guard.take_in_time();
+        self.traffic.add(heard);
+        self.answered = self.answered.saturating_add(heard);
+        if self.traffic.end_window(&mut self.window_from, now) {
+            guard.trust(0);
+        }
+        if guard.is_armed() {
+            (self.asked, self.answered) = (0, 0);
+        } else if self.asked >= ASKED {
+            self.compare_answers(guard, now);
         }
         let is_online = guard.link() == Link::Online;
         let since = if is_online { self.begin_slow(guard.is_armed(), &vitals, now) } else { None };
@@ -150,21 +161,15 @@ impl Watch {
         self.check_all(guard, vitals, since, now)
     }
 
-    /// Returns the largest rate of a single drive, with room for reports that a drive sends by itself.
-    fn most_answers_hz(&self) -> u32 {
-        if self.asked == 0 { u32::MAX } else { u32::from(self.asked) + 67 }
-    }
-
     /// Notes two drives with one id: the motor at rest had more answers than frames for one drive, and no second master asked.
     #[cold]
     #[inline(never)]
-    fn end_window(&mut self, guard: &mut Guard, now: Instant) {
-        guard.trust(0);
-        self.asked = if guard.is_armed() { UNCOUNTED } else { 0 };
+    fn compare_answers(&mut self, guard: &mut Guard, now: Instant) {
+        let is_crowded = 2 * u32::from(self.answered) > 3 * u32::from(self.asked);
+        (self.asked, self.answered) = (0, 0);
         let is_alone = !guard.conditions().contains(Condition::SecondMaster);
-        let is_double = is_alone && self.traffic.is_crowded();
         if !self.config.ignores(Condition::DuplicateId) {
-            guard.note(Condition::DuplicateId, is_double, now);
+            guard.note(Condition::DuplicateId, is_alone && is_crowded, now);
         }
     }
 

@@ -162,9 +162,6 @@ impl<M: DriveProtocol> Actuator<M> {
     #[inline(never)]
     pub(super) fn decide(&mut self, step: TimeStep, now: Instant) -> bool {
         let was_steady = core::mem::replace(&mut self.is_steady, false);
-        if self.motor.frames_per_answer() == 1 {
-            self.watch.ask();
-        }
         if self.guard.has_target() && !self.motor.capabilities().has(self.kind) {
             self.guard.relax();
         }
@@ -203,6 +200,10 @@ impl<M: DriveProtocol> Actuator<M> {
         // Between two frames of rest, another frame takes the place of one: the bus never has two of them at once to carry.
         let has_other = self.has_posted || inquiry.is_some();
         let gives_way = is_at_rest && self.offered.is_rest && has_other;
+        // The answer to a question is no feedback.
+        if self.motor.frames_per_answer() == 1 {
+            self.watch.ask(u16::from(self.has_posted) + u16::from(!gives_way));
+        }
         self.offer(if gives_way { inquiry } else { command });
         let is_rest = |frame: CanFrame| is_at_rest && !gives_way && !frame.is_remote();
         self.offered.is_rest = command.is_some_and(is_rest);

@@ -21,7 +21,7 @@
 //!
 //! An [`Actuator`](super::Actuator) and a motor without CAN are checked in each of their updates for errors, and each 8.2 ms
 //! for the rest: once armed, motors whose ids differ in the lower three bits in different milliseconds. A duplicate id is found while such a
-//! motor rests for a second, of drives that send answers alone.
+//! motor rests, of drives that send answers alone: within 128 frames that the drive answers with feedback, which is a second at 250 Hz.
 
 mod config;
 mod edge;

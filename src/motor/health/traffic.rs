@@ -33,8 +33,8 @@ impl Traffic {
         self.frames = self.frames.wrapping_add(1);
     }
 
-    /// Ends a window that began at `from`, if the window is over at `now`.
-    pub(crate) fn end_window(&mut self, from: &mut Instant, now: Instant, nominal_hz: u32) -> bool {
+    /// Ends a window that began at `from`, at a rate that the application chose, if the window is over at `now`.
+    pub(crate) fn end_window(&mut self, from: &mut Instant, now: Instant) -> bool {
         if now < *from {
             // The clock went back, and the length of the window is not known.
             (*from, self.frames) = (now, 0);
@@ -43,7 +43,7 @@ impl Traffic {
         let is_over = window >= Self::WINDOW;
         if is_over {
             let units = u16::try_from(window.as_micros() >> 10).unwrap_or(u16::MAX);
-            self.close(units, nominal_hz);
+            self.close(units, u32::MAX);
             *from = now;
         }
         is_over

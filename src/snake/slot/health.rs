@@ -159,7 +159,7 @@ fn check(slot: &mut Slot, is_stalled: bool, now: Instant) {
         slot.renew(Register::Position);
     }
     slot.traffic.add(slot.guard.take_in_time());
-    if slot.traffic.end_window(&mut slot.window_from, now, u32::MAX) {
+    if slot.traffic.end_window(&mut slot.window_from, now) {
         slot.guard.trust(0);
     }
     slot.guard.wake_at(if is_stalled { now } else { slot.window_from + Traffic::WINDOW });

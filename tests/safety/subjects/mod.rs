@@ -84,8 +84,9 @@ const ACTUATOR: Rules = Rules { opens_again: true, ..OWN };
 const PREPARED: Rules = Rules { is_prepared: true, resolution: 0.013, ..ACTUATOR };
 const FOLLOWING: Rules = Rules { opens: Opens::Scales, resolution: 0.002, ..PREPARED };
 
-/// No motor here turns: that one stands in spite of its output is not looked for.
+/// No motor here turns: that one stands in spite of its output is not looked for. Feedback comes beside the answers too, as of a second drive.
 const STANDS: HealthConfig = HealthConfig::new()
+    .with_reaction(Condition::DuplicateId, Reaction::Ignore)
     .with_reaction(Condition::Stalled, Reaction::Ignore)
     .with_reaction(Condition::Frozen, Reaction::Ignore);
 

@@ -1,0 +1,168 @@
+//! Two drives with one id: found at rest, at each rate of the loop, and nothing else looks like two.
+
+#![cfg(test)]
+#![expect(clippy::cast_precision_loss, reason = "microseconds of milliseconds")]
+
+use drivetrain::frame::CanFrame;
+use drivetrain::motor::{
+    Actuator, ArmError, Condition, Devices, DriveProtocol, HealthConfig, ImpedanceControl,
+    Reaction, Timeouts, VelocityDrive,
+};
+use drivetrain::sim::{DamiaoDrive, Drive, LkDrive, RmdDrive, RobStrideDrive};
+use drivetrain::time::{Duration, Instant, Tick};
+use drivetrain::units::AngularVelocity;
+use drivetrain::{damiao, lk, rmd, robstride};
+
+/// A motor beside its drives, in a loop of any rate.
+struct Bench<M> {
+    own: Actuator<M>,
+    drives: Vec<Box<dyn Drive>>,
+    /// So many of them are on the bus.
+    shown: usize,
+    period_us: u64,
+    now_us: u64,
+    /// Frames of another controller in each update.
+    rival: Option<CanFrame>,
+}
+
+impl<M: DriveProtocol> Bench<M> {
+    fn new<D: Drive + 'static>(motor: M, hz: u64, drive: impl Fn() -> D) -> Self {
+        // At rest each second frame may be a question.
+        let late = Duration::from_micros(2_500_000 / hz).max(Duration::from_millis(10));
+        let timeouts = Timeouts::new().with_feedback(late, Duration::from_millis(200)).unwrap();
+        let own = Actuator::new(motor).with_timeouts(timeouts);
+        let drives = (0..2).map(|_| Box::new(drive()) as Box<dyn Drive>).collect();
+        Self { own, drives, shown: 1, period_us: 1_000_000 / hz, now_us: 0, rival: None }
+    }
+
+    fn now(&self) -> Instant {
+        Instant::from_micros(self.now_us)
+    }
+
+    fn deliver(&mut self, frame: &CanFrame) {
+        let now = self.now();
+        for drive in self.drives.iter_mut().take(self.shown) {
+            if let Some(answer) = drive.hear(frame) {
+                _ = Devices::ingest(&mut self.own, &answer, now);
+            }
+        }
+    }
+
+    fn run(&mut self, ms: u64) {
+        for _ in 0..ms * 1_000 / self.period_us {
+            // Of the kind that the mode takes; refused by a disarmed motor.
+            _ = self.own.set_torque(0.0);
+            _ = self.own.set_velocity((), AngularVelocity::ZERO);
+            self.now_us += self.period_us;
+            let dt_s = self.period_us as f32 * 1e-6;
+            self.own.update(Tick::new(self.now(), dt_s));
+            while let Some(frame) = self.own.next_frame(0) {
+                self.deliver(&frame);
+            }
+            if let Some(frame) = self.rival {
+                let now = self.now();
+                _ = Devices::ingest(&mut self.own, &frame, now);
+                self.deliver(&frame);
+            }
+            self.drives.iter_mut().for_each(|drive| drive.step(dt_s));
+        }
+    }
+
+    fn is_double(&self) -> bool {
+        self.own.health().conditions.contains(Condition::DuplicateId)
+    }
+
+    /// Two drives are not armed, and one is, also after it was driven and switched off.
+    fn check(mut self, what: &str) {
+        self.run(2_500);
+        assert!(!self.is_double(), "{what}: one drive");
+        self.own.arm(self.now()).unwrap_or_else(|error| panic!("{what}: {error}"));
+        self.run(1_300);
+        assert!(self.own.is_armed() && self.own.guard().has_target(), "{what}: driven");
+        Devices::disarm(&mut self.own);
+        for _ in 0..20 {
+            self.run(100);
+            assert!(!self.is_double(), "{what}: one drive that was driven");
+        }
+        self.shown = 2;
+        self.run(3_000);
+        let refused = self.own.arm(self.now());
+        // The second echo of a drive that echoes commands is one of another node.
+        let is_found = matches!(refused, Err(ArmError::Faulty(_) | ArmError::SecondMaster(_)));
+        assert!(is_found, "{what}: two drives, {refused:?}");
+        self.shown = 1;
+        self.run(3_000);
+        self.own.arm(self.now()).unwrap_or_else(|error| panic!("{what}: one again, {error}"));
+    }
+}
+
+fn mit() -> ImpedanceControl {
+    ImpedanceControl::new(2.0).unwrap()
+}
+
+fn damiao(hz: u64) -> Bench<damiao::Motor> {
+    let model = damiao::Model::J4310;
+    let motor = damiao::Motor::new(model, 1, mit()).unwrap();
+    Bench::new(motor, hz, move || DamiaoDrive::of(model, 1))
+}
+
+#[test]
+fn two_drives_with_one_id_are_found_at_each_rate_of_the_loop() {
+    for hz in [100, 125, 200, 250, 400, 500, 700, 1_000, 2_000] {
+        damiao(hz).check(&format!("damiao at {hz} Hz"));
+        let mode = damiao::Mode::velocity(AngularVelocity::from_rad_per_s(5.0));
+        let motor = damiao::Motor::new(damiao::Model::J4310, 1, mode).unwrap();
+        let drive = || DamiaoDrive::of(damiao::Model::J4310, 1).with_register(10, 3.0);
+        Bench::new(motor, hz, drive).check(&format!("damiao, velocity, at {hz} Hz"));
+        let motor = robstride::Motor::new(robstride::Model::RS02, 1, mit()).unwrap();
+        let drive = || RobStrideDrive::of(robstride::Model::RS02, 1);
+        Bench::new(motor, hz, drive).check(&format!("robstride at {hz} Hz"));
+        let motor = lk::Motor::new(lk::Model::MG5010E_I10, 1, mit()).unwrap();
+        let drive = || LkDrive::of(lk::Model::MG5010E_I10, 1);
+        Bench::new(motor, hz, drive).check(&format!("lk at {hz} Hz"));
+        let motor = rmd::Motor::new(rmd::Model::X8_120, 1, mit()).unwrap();
+        Bench::new(motor, hz, || RmdDrive::new(1, 2.4)).check(&format!("rmd at {hz} Hz"));
+    }
+}
+
+/// Whenever the second drive comes, in the window of the rate or not.
+#[test]
+fn a_second_drive_is_found_within_a_second() {
+    for hz in [250, 500, 1_000] {
+        for begins_ms in [2_000, 2_100, 2_300, 2_500, 2_700, 2_900] {
+            let mut bench = damiao(hz);
+            bench.run(begins_ms);
+            bench.shown = 2;
+            bench.run(1_000);
+            assert!(bench.is_double(), "{hz} Hz, plugged in after {begins_ms} ms");
+            bench.shown = 1;
+            bench.run(1_000);
+            assert!(!bench.is_double(), "{hz} Hz, plugged in after {begins_ms} ms");
+        }
+        // Both were without supply while the controller ran.
+        for silent_ms in [1_000, 1_300, 1_600, 1_900] {
+            let mut bench = damiao(hz);
+            bench.shown = 0;
+            bench.run(silent_ms);
+            bench.shown = 2;
+            bench.run(1_000);
+            assert!(bench.is_double(), "{hz} Hz, silent for {silent_ms} ms");
+        }
+    }
+}
+
+/// The drive answers a tool, or another controller, that the program knows of.
+#[test]
+fn a_second_master_that_is_ignored_is_no_second_drive() {
+    static TOLERANT: HealthConfig =
+        HealthConfig::new().with_reaction(Condition::SecondMaster, Reaction::Ignore);
+    for hz in [250, 1_000] {
+        let mut bench = damiao(hz);
+        bench.own = bench.own.with_health(&TOLERANT).unwrap();
+        // Disables.
+        bench.rival = CanFrame::standard(1, [0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFD]);
+        bench.run(3_000);
+        assert!(!bench.is_double(), "{hz} Hz");
+        bench.own.arm(bench.now()).unwrap();
+    }
+}
