@@ -57,7 +57,7 @@ pub struct Motor {
     /// Faults were cleared since then.
     has_cleared: bool,
     settings: Settings<Register, 3>,
-    /// A command to be sent once at rest.
+    /// A command to be sent once at rest. The settings are unknown until then: a motor that is armed before would forget the command.
     once: Option<Command>,
     /// Counts questions.
     questions: u8,
@@ -142,11 +142,12 @@ impl Motor {
         Ok(())
     }
 
-    /// Makes the present position zero; while the motor is disarmed. The frame goes out once. A driven motor forgets the request: the shaft
+    /// Makes the present position zero; while the motor is disarmed. The frame goes out once, and the motor is not armed before. A driven motor forgets the request: the shaft
     /// would be elsewhere when the motor is disarmed. A RobStride keeps the zero over a loss of the supply if [stored](Self::store), a
     /// CyberGear does not.
     pub const fn set_zero(&mut self) {
         self.once = Some(Command::SetZero);
+        self.settings.forget();
     }
 
     /// Gives the drive another id, 1 to 127, at once; while the motor is disarmed. The frame goes out once, and a driven motor forgets the
@@ -160,6 +161,7 @@ impl Motor {
             return Err(ConfigError::Conflict("id"));
         }
         self.once = Some(Command::SetId(id));
+        self.settings.forget();
         Ok(())
     }
 

@@ -519,3 +519,19 @@ impl Named for Motor {
         drivetrain::motor::DriveProtocol::name(self).to_string()
     }
 }
+
+/// The program sets the zero and arms in the same tick: the joint would be led to angles from the zero before.
+#[test]
+fn a_zero_that_was_not_sent_yet_holds_up_arming() {
+    let mut bench = Bench::new(operation());
+    bench.drive.shaft_mut().set_angle(2.0);
+    bench.steps(300, |_| {});
+    bench.own.motor_mut().set_zero();
+    let refused = bench.own.arm(bench.now()).unwrap_err().to_string();
+    assert!(refused.starts_with("RS02 #1 has not answered yet what its "), "{refused}");
+    bench.steps(200, |bench| _ = bench.own.set_torque(0.0));
+    assert!(bench.drive.shaft().angle_rad().abs() < 0.1, "{}", bench.drive.shaft().angle_rad());
+    bench.own.arm(bench.now()).unwrap();
+    bench.steps(100, |bench| bench.own.set_torque(0.0).unwrap());
+    assert!(bench.drive.shaft().angle_rad().abs() < 0.1, "{}", bench.drive.shaft().angle_rad());
+}
