@@ -716,3 +716,21 @@ fn targets_between_a_loss_and_the_first_feedback_send_nothing() {
         assert!(bench.own.set_angle((), Angle::from_radians(-3.0)).is_err());
     });
 }
+
+/// A wheel by the loop of the drive, with a zero for the angle of its encoder: status 1 at 1 kHz, status 4 at 20 Hz.
+#[test]
+fn an_angle_that_comes_20_times_a_second_is_no_jump() {
+    for rad_per_s in [20.0, 40.0, 150.0] {
+        let motor = Motor::new(MODEL, 23, Mode::velocity()).unwrap().with_encoder();
+        let mut bench = Bench::of(motor);
+        bench.own = bench.own.with_zero(Angle::ZERO).unwrap();
+        bench.arm();
+        for ms in 0..3_000 {
+            bench.reports = if ms % 50 == 0 { vec![16, 9] } else { vec![9] };
+            bench.own.set_velocity((), AngularVelocity::from_rad_per_s(rad_per_s)).unwrap();
+            bench.step();
+        }
+        let velocity = bench.own.motor().velocity().as_rad_per_s();
+        assert!(bench.own.is_armed() && velocity > 0.9 * rad_per_s, "{velocity} of {rad_per_s}");
+    }
+}
