@@ -555,3 +555,19 @@ fn a_drive_that_knows_its_angle_has_soft_limits_from_its_own_zero() {
         assert_near(bench.update(4, 0.001), sent);
     }
 }
+
+/// With the defaults of the trait: no question, so a drive that reports by itself, oftener than the loop runs.
+#[test]
+fn a_drive_that_reports_by_itself_is_alone_however_often_it_does() {
+    for (period, reports) in [(1, 1), (1, 2), (2, 1), (4, 2)] {
+        let mut bench =
+            Bench(Actuator::new(Plain { angle: 0.0, velocity: 0.0, is_absolute: false }));
+        for ms in 1..4_000 {
+            (0..reports).for_each(|_| bench.hear(ms, 0.0, 0.0));
+            if ms % period == 0 {
+                bench.update(ms, 0.001);
+            }
+        }
+        assert_eq!(bench.0.arm(at_ms(3_999)), Ok(()), "each {period} ms, {reports} reports a ms");
+    }
+}

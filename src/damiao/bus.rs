@@ -297,6 +297,10 @@ impl DriveProtocol for Motor {
         self.settings.forget();
     }
 
+    fn frames_per_answer(&self) -> u32 {
+        1
+    }
+
     fn capabilities(&self) -> Capabilities {
         const FEEDBACK: Capabilities = Capabilities::of(&[
             Capability::Temperature,

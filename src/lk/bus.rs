@@ -317,6 +317,10 @@ impl DriveProtocol for Motor {
         self.state = None;
     }
 
+    fn frames_per_answer(&self) -> u32 {
+        1
+    }
+
     fn capabilities(&self) -> Capabilities {
         let capabilities = self.mode.0.capabilities().with(Capability::Temperature);
         capabilities.with(Capability::ErrorCodes)

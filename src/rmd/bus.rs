@@ -267,6 +267,10 @@ impl DriveProtocol for Motor {
         self.enabling.is_heard = false;
     }
 
+    fn frames_per_answer(&self) -> u32 {
+        1
+    }
+
     fn capabilities(&self) -> Capabilities {
         let capabilities = self.mode.0.capabilities().with(Capability::Temperature);
         capabilities.with(Capability::ErrorCodes)

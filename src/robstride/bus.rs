@@ -290,7 +290,6 @@ impl DriveProtocol for Motor {
     /// a write with its feedback, so a value written by the application is read back.
     fn inquire(&mut self) -> Option<CanFrame> {
         if let Some(command) = self.once.take() {
-            self.settings.forget();
             return Some(self.frame_of(command));
         }
         self.questions = self.questions.wrapping_add(1);
@@ -299,8 +298,7 @@ impl DriveProtocol for Motor {
         if found.is_some_and(|it| it != mode.to_bits()) && self.questions.is_multiple_of(4) {
             return Some(self.frame_of(Command::Write(Register::RunMode, mode)));
         }
-        let asked = self.settings.inquire()?;
-        let asked = self.settings.reading_back(asked);
+        let asked = self.settings.inquire().map(|asked| self.settings.reading_back(asked))?;
         Some(self.frame_of(Command::of(asked)))
     }
 
@@ -313,9 +311,7 @@ impl DriveProtocol for Motor {
                 if register == Register::MechanicalPosition {
                     self.laps.set(value, self.model.pmax_rad());
                 }
-                if let Some(asked) = self.settings.awaited(register) {
-                    self.settings.take(asked, value);
-                }
+                self.settings.take_value(register, value);
             }
             FAULTS => (self.reported, self.has_cleared) = (u32::from_le_bytes([a, b, c, d]), false),
             _ => {}
@@ -331,6 +327,10 @@ impl DriveProtocol for Motor {
 
     fn forget_settings(&mut self) {
         self.settings.forget();
+    }
+
+    fn frames_per_answer(&self) -> u32 {
+        1
     }
 
     fn capabilities(&self) -> Capabilities {

@@ -187,13 +187,13 @@ pub trait DriveProtocol {
     /// or be another drive.
     fn forget_settings(&mut self) {}
 
-    /// Returns the number of frames to the drive for one answer, for the largest [load](super::Actuator::load) of the bus: 1, the default, if
-    /// the drive answers each frame, and sends less than half as much feedback by itself; 2 if the drive answers questions alone,
-    /// since a question stands between two other frames; 0 for no answers.
+    /// Returns the number of frames to the drive for one answer, for the largest [load](super::Actuator::load) of the bus: 0, the default, if
+    /// the drive sends its feedback by itself; 1 if the drive answers each frame; 2 if the drive answers questions alone, since a
+    /// question stands between two other frames.
     ///
     /// With 1, more feedback than one and a half times the frames comes from two drives with one id: such a motor is not armed.
     fn frames_per_answer(&self) -> u32 {
-        1
+        0
     }
 
     /// Returns the capabilities of the motor: velocities and feedback, unless said otherwise.

@@ -173,9 +173,11 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
         if self.is_written { inquiry } else { Inquiry::Read(setting) }
     }
 
-    /// Returns the question whose answer is awaited, if about this setting.
-    pub(crate) fn awaited(&self, setting: R) -> Option<Inquiry<R>> {
-        self.asked.filter(|asked| asked.setting() == Some(setting))
+    /// Takes the value of a setting, if an answer about the setting is awaited.
+    pub(crate) fn take_value(&mut self, setting: R, value: f32) {
+        if let Some(asked) = self.asked.filter(|asked| asked.setting() == Some(setting)) {
+            self.take(asked, value);
+        }
     }
 
     /// Takes a question of the application, in the place of a waiting question.
