@@ -142,9 +142,9 @@ impl Motor {
         Ok(())
     }
 
-    /// Makes the present position zero; while the motor is disarmed. The frame goes out once, and the motor is not armed before. A driven motor forgets the request: the shaft
-    /// would be elsewhere when the motor is disarmed. A RobStride keeps the zero over a loss of the supply if [stored](Self::store), a
-    /// CyberGear does not.
+    /// Makes the present position zero; while the motor is disarmed, and the motor is not armed before the frame went out. The frame is sent
+    /// again if no driver took it. A driven motor forgets the request: the shaft would be elsewhere when the motor is disarmed. A RobStride
+    /// keeps the zero over a loss of the supply if [stored](Self::store), a CyberGear does not.
     pub const fn set_zero(&mut self) {
         self.once = Some(Command::SetZero);
         self.settings.forget();
@@ -180,11 +180,10 @@ impl Motor {
 
     /// Tells whether a value in the drive is right. Every finite time-out is right: the configured value is written later.
     fn is_right(&self, register: Register, found: f32) -> bool {
+        let pmax_rad = self.model.pmax_rad();
         match register {
             Register::RunMode => found.to_bits() == self.expected(register).to_bits(),
-            Register::MechanicalPosition if self.mode.control.is_angle() => {
-                found.abs() < self.model.pmax_rad()
-            }
+            Register::MechanicalPosition if self.mode.control.is_angle() => found.abs() < pmax_rad,
             _ => found.is_finite(),
         }
     }
@@ -243,8 +242,7 @@ impl DriveProtocol for Motor {
     fn control(&mut self, order: Order) -> CanFrame {
         self.once = None;
         let shaft = (self.angle(), self.velocity());
-        let command = self.drive.and_then(|_| self.mode.command(order, shaft, &self.model));
-        match command {
+        match self.drive.and_then(|_| self.mode.command(order, shaft, &self.model)) {
             Some(Command::Operation(command)) => operation(&command, &self.model, self.id),
             Some(command) => self.frame_of(command),
             None => self.rest(),
@@ -280,6 +278,12 @@ impl DriveProtocol for Motor {
 
     fn poll(&mut self) -> Option<CanFrame> {
         self.drive.map(|_| self.frame_of(self.mode.stay((self.angle(), self.velocity()))))
+    }
+
+    fn unsent(&mut self, frame: &CanFrame) {
+        if *frame == self.frame_of(Command::SetZero) {
+            self.set_zero();
+        }
     }
 
     fn is_enabled(&self) -> Option<bool> {

@@ -2,8 +2,7 @@
 
 use super::{Model, Register};
 use crate::frame::{CanFrame, extended_id};
-use crate::motor::Impedance;
-use crate::motor::{Inquiry, code_from};
+use crate::motor::{Impedance, Inquiry, code_from};
 use crate::units::Angle;
 use crate::wire::mit;
 use embedded_can::ExtendedId;

@@ -3,8 +3,9 @@
 use super::codec::Command;
 use super::{Model, Register};
 use crate::error::ConfigError;
-use crate::motor::Impedance;
-use crate::motor::{ControlMode, Goal, ImpedanceControl, Order, Preparation, Shaft, Told, inside};
+use crate::motor::{
+    ControlMode, Goal, Impedance, ImpedanceControl, Order, Preparation, Shaft, Told, inside,
+};
 use crate::units::AngularVelocity;
 
 /// A run mode of the drive. An [`ImpedanceControl`] is also a mode: in the operation mode the drive follows an impedance.
@@ -105,22 +106,21 @@ impl Mode {
     /// Returns the command to the drive within the share of its largest effort; `None` to rest.
     pub(super) fn command(&mut self, order: Order, shaft: Shaft, model: &Model) -> Option<Command> {
         let goal = self.control.impedance_goal(order, || shaft, model.ranges(), 65_535)?;
+        let share = order.share;
         Some(match goal {
             Goal::Impedance(command) => Command::Operation(command),
             Goal::Torque(torque_nm) if self.control.is_impedance() => {
                 Command::Operation(Impedance::torque(torque_nm))
             }
             Goal::Torque(torque_nm) => {
-                let limit = self.current_a * order.share;
+                let limit = self.current_a * share;
                 let current = (torque_nm / self.nm_per_ampere).min(limit).max(-limit);
                 Command::Write(Register::CurrentTarget, current)
             }
-            Goal::Velocity(velocity) => {
-                self.limited(order.share, Register::VelocityTarget, velocity)
-            }
+            Goal::Velocity(velocity) => self.limited(share, Register::VelocityTarget, velocity),
             Goal::Way(way) => {
                 let position = inside(shaft.0?.as_radians(), way, model.pmax_rad());
-                self.limited(order.share, Register::PositionTarget, position)
+                self.limited(share, Register::PositionTarget, position)
             }
         })
     }

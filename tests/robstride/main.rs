@@ -535,3 +535,36 @@ fn a_zero_that_was_not_sent_yet_holds_up_arming() {
     bench.steps(100, |bench| bench.own.set_torque(0.0).unwrap());
     assert!(bench.drive.shaft().angle_rad().abs() < 0.1, "{}", bench.drive.shaft().angle_rad());
 }
+
+/// The driver refuses the frame with the zero, and takes all others.
+#[test]
+fn a_zero_that_no_driver_took_is_sent_later() {
+    let mut bench = Bench::new(operation());
+    bench.drive.shaft_mut().set_angle(2.0);
+    bench.steps(300, |_| {});
+    bench.own.motor_mut().set_zero();
+    let mut refused = 0;
+    for _ in 0..200 {
+        if refused == 3 {
+            break;
+        }
+        bench.now_us += 1_000;
+        let now = bench.now();
+        bench.own.update(Tick::new(now, 0.001));
+        while let Some(frame) = bench.own.next_frame(0) {
+            if kind(&frame) == 6 {
+                refused += 1;
+                assert!(Devices::put_back(&mut bench.own, &frame));
+                break;
+            }
+            if let Some(answer) = bench.drive.hear(&frame) {
+                _ = Devices::ingest(&mut bench.own, &answer, now);
+            }
+        }
+    }
+    assert_eq!(refused, 3, "the frame comes again");
+    assert!((bench.drive.shaft().angle_rad() - 2.0).abs() < 0.1, "not sent yet");
+    assert!(bench.own.arm(bench.now()).is_err());
+    bench.steps(200, |bench| _ = bench.own.set_torque(0.0));
+    assert!(bench.drive.shaft().angle_rad().abs() < 0.1, "{}", bench.drive.shaft().angle_rad());
+}
