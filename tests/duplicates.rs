@@ -53,19 +53,23 @@ impl<M: DriveProtocol> Bench<M> {
             // Of the kind that the mode takes; refused by a disarmed motor.
             _ = self.own.set_torque(0.0);
             _ = self.own.set_velocity((), AngularVelocity::ZERO);
-            self.now_us += self.period_us;
-            let dt_s = self.period_us as f32 * 1e-6;
-            self.own.update(Tick::new(self.now(), dt_s));
-            while let Some(frame) = self.own.next_frame(0) {
-                self.deliver(&frame);
-            }
-            if let Some(frame) = self.rival {
-                let now = self.now();
-                _ = Devices::ingest(&mut self.own, &frame, now);
-                self.deliver(&frame);
-            }
-            self.drives.iter_mut().for_each(|drive| drive.step(dt_s));
+            self.tick();
         }
+    }
+
+    fn tick(&mut self) {
+        self.now_us += self.period_us;
+        let dt_s = self.period_us as f32 * 1e-6;
+        self.own.update(Tick::new(self.now(), dt_s));
+        while let Some(frame) = self.own.next_frame(0) {
+            self.deliver(&frame);
+        }
+        if let Some(frame) = self.rival {
+            let now = self.now();
+            _ = Devices::ingest(&mut self.own, &frame, now);
+            self.deliver(&frame);
+        }
+        self.drives.iter_mut().for_each(|drive| drive.step(dt_s));
     }
 
     fn is_double(&self) -> bool {
@@ -122,6 +126,34 @@ fn two_drives_with_one_id_are_found_at_each_rate_of_the_loop() {
         Bench::new(motor, hz, drive).check(&format!("lk at {hz} Hz"));
         let motor = rmd::Motor::new(rmd::Model::X8_120, 1, mit()).unwrap();
         Bench::new(motor, hz, || RmdDrive::new(1, 2.4)).check(&format!("rmd at {hz} Hz"));
+    }
+}
+
+/// The program asks from the first tick on, and a person has not waited.
+#[test]
+fn two_drives_from_the_start_are_never_armed_and_one_is_soon() {
+    for hz in [100_u32, 250, 500, 1_000, 2_000] {
+        let robstride = || {
+            let motor = robstride::Motor::new(robstride::Model::RS02, 1, mit()).unwrap();
+            Bench::new(motor, hz.into(), || RobStrideDrive::of(robstride::Model::RS02, 1))
+        };
+        check_start(&damiao, hz);
+        check_start(&|_| robstride(), hz);
+    }
+}
+
+fn check_start<M: DriveProtocol>(bench: &dyn Fn(u64) -> Bench<M>, hz: u32) {
+    for shown in [1, 2] {
+        let mut bench = bench(hz.into());
+        bench.shown = shown;
+        let mut ticks = 0;
+        while ticks < 6 * hz && bench.own.arm(bench.now()).is_err() {
+            bench.tick();
+            ticks += 1;
+        }
+        assert_eq!(bench.own.is_armed(), shown == 1, "{hz} Hz, {shown} drives");
+        // A request in each tick is one request, which a trip would refuse; none tripped.
+        assert!(shown == 2 || ticks < 250, "{hz} Hz: {ticks} ticks");
     }
 }
 

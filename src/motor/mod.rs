@@ -88,10 +88,10 @@ pub(crate) use devices::ask;
 pub use drive::{AngleDrive, Measured, OneOf, TargetError, VelocityDrive};
 pub use guard::Guard;
 pub(crate) use guard::furthest;
-pub use health::{Condition, Conditions, Health, HealthConfig, Reaction};
 pub(crate) use health::{
-    Journal, Latch, Monitor, Sample, Severity, Traffic, check_soft_limits, elapsed,
+    Answers, Journal, Latch, Monitor, Sample, Severity, Traffic, check_soft_limits, elapsed,
 };
+pub use health::{Condition, Conditions, Health, HealthConfig, Reaction};
 pub use homing::{HomingStep, StopHoming};
 pub use link::{Link, Timeouts};
 pub(crate) use link::{age, is_near, take_age};

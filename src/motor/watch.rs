@@ -1,8 +1,8 @@
 //! Health of one motor outside of a bus: its vitals, their checks, and its conditions.
 
 use super::{
-    Condition, Conditions, Guard, Health, HealthConfig, Latch, Link, Monitor, MotorName, Sample,
-    Severity, Traffic, elapsed,
+    Answers, Condition, Conditions, Guard, Health, HealthConfig, Latch, Link, Monitor, MotorName,
+    Sample, Severity, Traffic, elapsed,
 };
 use crate::time::{Duration, Edge, Instant};
 
@@ -16,9 +16,6 @@ const PERIOD_US: u64 = 8_192;
 /// make one tick in eight long.
 const PARTS: u64 = 8;
 
-/// So many frames to a drive are compared with its answers: more than half as many again come from two drives.
-const ASKED: u16 = 64;
-
 /// Checks one motor outside the slots of a bus: counts its frames, and judges its vitals.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Watch {
@@ -26,9 +23,7 @@ pub(crate) struct Watch {
     monitor: Monitor,
     traffic: Traffic,
     window_from: Instant,
-    /// Frames to the drive at rest that the drive answers with feedback, and the feedback since, until both are compared.
-    asked: u16,
-    answered: u16,
+    answers: Answers,
     saturated: u16,
     error_code: u8,
     checked: Instant,
@@ -47,8 +42,7 @@ impl Watch {
             monitor: Monitor::NEW,
             traffic: Traffic::NONE,
             window_from: Instant::START,
-            asked: 0,
-            answered: 0,
+            answers: Answers::NONE,
             saturated: 0,
             error_code: 0,
             checked: Instant::START,
@@ -76,11 +70,24 @@ impl Watch {
             Some(gap_us) => self.traffic.gap(gap_us),
             None => {
                 self.window_from = now;
-                (self.asked, self.answered) = (0, 0);
+                self.forget_drive();
             }
         }
         self.traffic.count();
-        self.answered = self.answered.saturating_add(1);
+        self.answers.add(1);
+    }
+
+    /// Forgets that one drive answers: another may have come.
+    pub(crate) const fn forget_drive(&mut self) {
+        self.answers = Answers::NONE;
+    }
+
+    /// Tells whether a drive that answers each frame is known to be the only one with its id, or need not be.
+    pub(crate) fn is_single(&self) -> bool {
+        let ignores = |condition| self.config.ignores(condition);
+        // A second master that is ignored is answered too.
+        let need_not = ignores(Condition::DuplicateId) || ignores(Condition::SecondMaster);
+        need_not || self.answers.are_of_one()
     }
 
     /// Returns the gap from which feedback lengthens the longest gap of the present window.
@@ -95,12 +102,12 @@ impl Watch {
 
     /// Notes so many frames to a drive at rest that sends nothing but answers.
     pub(crate) const fn ask(&mut self, frames: u16) {
-        self.asked = self.asked.saturating_add(frames);
+        self.answers.ask(frames);
     }
 
     /// Notes a command of another node, which relaxes the motor where a second master demands rest. The drive answers that node too.
     pub(crate) fn hear_rival(&mut self, guard: &mut Guard, now: Instant) {
-        (self.asked, self.answered) = (0, 0);
+        self.answers.begin();
         let before = guard.conditions();
         if !self.config.ignores(Condition::SecondMaster) {
             guard.note(Condition::SecondMaster, true, now);
@@ -142,13 +149,13 @@ impl Watch {
         let vitals = vitals();
         let heard = guard.take_in_time();
         self.traffic.add(heard);
-        self.answered = self.answered.saturating_add(heard);
+        self.answers.add(heard);
         if self.traffic.end_window(&mut self.window_from, now) {
             guard.trust(0);
         }
         if guard.is_armed() {
-            (self.asked, self.answered) = (0, 0);
-        } else if self.asked >= ASKED {
+            self.answers.begin();
+        } else if self.answers.are_enough() {
             self.compare_answers(guard, now);
         }
         let is_online = guard.link() == Link::Online;
@@ -165,11 +172,10 @@ impl Watch {
     #[cold]
     #[inline(never)]
     fn compare_answers(&mut self, guard: &mut Guard, now: Instant) {
-        let is_crowded = 2 * u32::from(self.answered) > 3 * u32::from(self.asked);
-        (self.asked, self.answered) = (0, 0);
+        self.answers.compare();
         let is_alone = !guard.conditions().contains(Condition::SecondMaster);
         if !self.config.ignores(Condition::DuplicateId) {
-            guard.note(Condition::DuplicateId, is_alone && is_crowded, now);
+            guard.note(Condition::DuplicateId, is_alone && !self.answers.are_of_one(), now);
         }
     }
 

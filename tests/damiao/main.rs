@@ -32,6 +32,8 @@ fn a_motor_is_armed_when_its_settings_have_been_read() {
     bench.steps(5, |_| {});
     assert!(refused(&mut bench).starts_with("DM-J4310 #1 has not answered yet what its "));
     bench.steps(60, |_| {});
+    assert_eq!(refused(&mut bench), "DM-J4310 #1 has not answered yet what its id is", "alone?");
+    bench.steps(60, |_| {});
     assert_eq!(bench.own.arm(bench.now()), Ok(()));
 }
 

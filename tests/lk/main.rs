@@ -43,6 +43,8 @@ fn a_motor_is_armed_when_its_state_has_been_read() {
     bench.steps(5, |_| {});
     assert_eq!(refused(&mut bench), "MF9025-16T #1 has not answered yet what its motorState is");
     bench.steps(40, |_| {});
+    assert_eq!(refused(&mut bench), "MF9025-16T #1 has not answered yet what its id is", "alone?");
+    bench.steps(80, |_| {});
     assert_eq!(bench.own.arm(bench.now()), Ok(()));
     assert!(!bench.drive.is_on(), "switched off at the start, and on when it is driven");
 }

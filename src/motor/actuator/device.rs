@@ -110,7 +110,14 @@ impl<M: DriveProtocol> CanDevice for Actuator<M> {
 
     /// An armed motor has asked before, and asks again before its drive is enabled.
     fn wrong_setting(&self) -> Option<WrongSetting> {
-        if self.guard.is_armed() { None } else { self.motor.wrong_setting() }
+        if self.guard.is_armed() {
+            return None;
+        }
+        // Two drives as delivered have one id.
+        let is_single = self.motor.frames_per_answer() != 1 || self.watch.is_single();
+        let name = self.motor.name();
+        let id = || WrongSetting::new(name, "id", name.id().into(), None);
+        self.motor.wrong_setting().or_else(|| (!is_single).then(id))
     }
 
     fn second_master(&self) -> Option<Claim> {
@@ -126,7 +133,7 @@ impl<M: DriveProtocol> CanDevice for Actuator<M> {
     }
 
     fn engage(&mut self, now: Instant) {
-        let is_fit = !self.watch.is_faulty(&self.guard) && self.motor.wrong_setting().is_none();
+        let is_fit = !self.watch.is_faulty(&self.guard) && self.wrong_setting().is_none();
         if is_fit && self.guard.engage(now) {
             self.watch.start(&mut self.guard, self.motor.name(), now);
             self.relax();

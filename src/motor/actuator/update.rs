@@ -44,6 +44,7 @@ impl<M: DriveProtocol> Actuator<M> {
         let is_silence = self.guard.is_silence(gap_us);
         if is_silence {
             self.motor.forget_settings();
+            self.watch.forget_drive();
         }
         if self.joint.depends_on_supply() {
             self.doubt(gap_us, is_silence, now);

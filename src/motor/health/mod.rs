@@ -34,7 +34,7 @@ use crate::time::Duration;
 pub use config::{HealthConfig, Reaction};
 pub(crate) use edge::{Journal, Latch};
 pub(crate) use monitor::{Monitor, Sample, check_soft_limits, elapsed};
-pub(crate) use traffic::Traffic;
+pub(crate) use traffic::{Answers, Traffic};
 
 /// State and statistics of a motor, in one line of a log.
 ///

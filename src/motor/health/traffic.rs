@@ -128,6 +128,50 @@ const fn saturated(value: u32) -> u16 {
     if value < u16::MAX as u32 { value as u16 } else { u16::MAX }
 }
 
+/// Frames to a drive at rest that the drive answers with feedback, beside its feedback.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Answers {
+    asked: u16,
+    answered: u16,
+    are_of_one: bool,
+}
+
+impl Answers {
+    /// So many frames are compared with the feedback: more than half as much again comes from two drives.
+    const ENOUGH: u16 = 64;
+
+    pub(crate) const NONE: Self = Self { asked: 0, answered: 0, are_of_one: false };
+
+    /// Counts from zero, and keeps the last comparison.
+    pub(crate) const fn begin(&mut self) {
+        (self.asked, self.answered) = (0, 0);
+    }
+
+    pub(crate) const fn ask(&mut self, frames: u16) {
+        self.asked = self.asked.saturating_add(frames);
+    }
+
+    #[inline]
+    pub(crate) const fn add(&mut self, frames: u16) {
+        self.answered = self.answered.saturating_add(frames);
+    }
+
+    pub(crate) const fn are_enough(&self) -> bool {
+        self.asked >= Self::ENOUGH
+    }
+
+    /// Compares both numbers, and begins anew.
+    pub(crate) fn compare(&mut self) {
+        self.are_of_one = 2 * u32::from(self.answered) <= 3 * u32::from(self.asked);
+        self.begin();
+    }
+
+    /// Tells whether the last comparison found one drive.
+    pub(crate) const fn are_of_one(&self) -> bool {
+        self.are_of_one
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
