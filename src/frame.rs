@@ -361,6 +361,23 @@ mod tests {
         StandardId::new(raw).unwrap()
     }
 
+    /// Counted on ISO 11898-1: 44 bits and 64 without data, 3 of a pause, and a stuff bit after the fifth bit and each fourth from then on, as
+    /// Davis, Burns, Bril and Lukkien (2007) bound it: 135 and 160 with eight bytes.
+    #[test]
+    fn a_frame_has_the_bits_of_the_standard() {
+        let long = ExtendedId::new(0x201).unwrap();
+        for (length, short, extended) in
+            [(0, (47, 55), (67, 80)), (1, (55, 65), (75, 90)), (8, (111, 135), (131, 160))]
+        {
+            let data = &[0; 8][..length];
+            assert_eq!(CanFrame::new(standard(0x201), data).unwrap().bits(), short);
+            assert_eq!(CanFrame::new(long, data).unwrap().bits(), extended);
+            // No data, whatever the length says.
+            assert_eq!(CanFrame::new_remote(standard(0x201), length).unwrap().bits(), (47, 55));
+            assert_eq!(CanFrame::new_remote(long, length).unwrap().bits(), (67, 80));
+        }
+    }
+
     #[test]
     fn every_length_up_to_eight_is_kept_and_nine_is_refused() {
         let bytes = [1, 2, 3, 4, 5, 6, 7, 8, 9];
