@@ -116,11 +116,10 @@ pub(super) fn arm_only<const N: usize>(
     Obstacles::check(is_stopped, granted, |found| {
         let slots = || chosen.clone().filter_map(|motor| motors.get(motor));
         let missing = slots().filter(|slot| motors.guard.misses(&slot.guard, now));
-        let faulty = slots().filter(|slot| health::is_faulty(slot));
         found.has_motors = slots().next().is_some();
         found.missing.extend(missing.filter_map(Slot::name));
         found.second_master = rival_among(slots());
-        found.faulty.extend(faulty.filter_map(Slot::name));
+        found.faulty.extend_unfit(slots().filter_map(health::unfit));
     })?;
     if !motors.guard.begin_arming(now) {
         return Ok(());

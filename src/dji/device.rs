@@ -5,8 +5,8 @@ use super::slot::{Slot, health};
 use super::{AnyHandle, Bus, Handle, Model};
 use crate::frame::CanFrame;
 use crate::motor::{
-    AngleDrive, CanDevice, Capabilities, Claim, Condition, Ingest, Link, MotorName, TargetError,
-    VelocityDrive, WrongSetting,
+    AngleDrive, CanDevice, Capabilities, Claim, Condition, Conditions, Ingest, Link, MotorName,
+    TargetError, VelocityDrive, WrongSetting,
 };
 use crate::time::{Edge, Instant, Tick};
 use crate::units::{Angle, AngularVelocity};
@@ -54,8 +54,8 @@ impl<B, const N: usize> CanDevice for Bus<B, N> {
         self.motors.slots.iter().filter(missing).filter_map(Slot::name)
     }
 
-    fn faulty(&self) -> impl Iterator<Item = MotorName> {
-        self.motors.slots.iter().filter(|slot| health::is_faulty(slot)).filter_map(Slot::name)
+    fn faulty(&self) -> impl Iterator<Item = (MotorName, Conditions)> {
+        self.motors.slots.iter().filter_map(health::unfit)
     }
 
     fn wrong_setting(&self) -> Option<WrongSetting> {

@@ -2,7 +2,7 @@
 
 #[cfg(feature = "hal")]
 use super::Guard;
-use super::{BusLoad, Claim, MotorName};
+use super::{BusLoad, Claim, Conditions, MotorName};
 use crate::time::{Duration, Instant, Tick};
 
 /// The motors that prevent arming, by name.
@@ -12,6 +12,8 @@ pub struct Missing {
     names: [Option<MotorName>; Self::CAPACITY],
     total: u16,
     full_bus: Option<u16>,
+    /// What is wrong with them, if their feedback is not.
+    conditions: Conditions,
 }
 
 impl Missing {
@@ -29,7 +31,19 @@ impl Missing {
         names.for_each(|name| self.add(name));
     }
 
-    const NONE: Self = Self { names: [None; Self::CAPACITY], total: 0, full_bus: None };
+    const NONE: Self = Self {
+        names: [None; Self::CAPACITY],
+        total: 0,
+        full_bus: None,
+        conditions: Conditions::NONE,
+    };
+
+    pub(crate) fn extend_unfit(&mut self, motors: impl Iterator<Item = (MotorName, Conditions)>) {
+        for (name, conditions) in motors {
+            self.add(name);
+            self.conditions = self.conditions.or(conditions);
+        }
+    }
 
     /// Keeps the load of the bus if the bus may be full.
     fn on_bus(self, load: Option<BusLoad>) -> Self {
@@ -71,6 +85,9 @@ impl core::fmt::Display for Missing {
         match usize::from(self.total).saturating_sub(Self::CAPACITY) {
             0 => {}
             more => write!(f, " and {more} more")?,
+        }
+        if !self.conditions.is_empty() {
+            write!(f, " ({})", self.conditions)?;
         }
         let Some(load) = self.full_bus else { return Ok(()) };
         write!(
@@ -371,15 +388,18 @@ pub enum SwitchOrder {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::motor::Condition;
     use std::string::ToString;
 
     #[test]
     fn a_refusal_says_what_to_do() {
-        let faulty = Missing::collect([MotorName::new("DM-J8009", 5)].into_iter()).unwrap();
+        let doubled = Conditions::NONE.with(Condition::DuplicateId);
+        let mut faulty = Missing::NONE;
+        faulty.extend_unfit([(MotorName::new("DM-J8009", 5), doubled)].into_iter());
         for (error, remedy) in [
             (ArmError::Stopped, "clear_emergency_stop"),
             (ArmError::NotReleased, "a clock that moves on"),
-            (ArmError::Faulty(faulty), "see health(): DM-J8009 #5"),
+            (ArmError::Faulty(faulty), "see health(): DM-J8009 #5 (duplicate id)"),
         ] {
             assert!(error.to_string().contains(remedy), "{error}");
         }

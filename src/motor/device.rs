@@ -1,6 +1,6 @@
 //! A device, and actions on every device of several: one visitor for each action.
 
-use super::{Claim, Condition, MotorName, Obstacles, WrongSetting};
+use super::{Claim, Condition, Conditions, MotorName, Obstacles, WrongSetting};
 use crate::frame::CanFrame;
 use crate::time::{Edge, Instant, Tick};
 use core::ops::Range;
@@ -26,7 +26,7 @@ use embedded_can::Frame;
 ///     fn superseded(&self) -> u32 { 0 }
 ///     fn claims(&self) -> impl Iterator<Item = Claim> { core::iter::empty() }
 ///     fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName> { core::iter::empty() }
-///     // fn faulty(&self) -> impl Iterator<Item = MotorName>
+///     // fn faulty(&self) -> impl Iterator<Item = (MotorName, Conditions)>
 ///     fn wrong_setting(&self) -> Option<WrongSetting> { None }
 ///     fn second_master(&self) -> Option<Claim> { None }
 ///     fn next_edge(&mut self) -> Option<Edge<Condition, MotorName>> { None }
@@ -70,8 +70,8 @@ pub trait CanDevice {
     /// Lists the motors without fresh feedback at `now`.
     fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName>;
 
-    /// Lists the motors that must not be driven despite their feedback, for example after a fault of the ESC.
-    fn faulty(&self) -> impl Iterator<Item = MotorName>;
+    /// Lists the motors that must not be driven despite their feedback, for example after a fault of the ESC, with their conditions.
+    fn faulty(&self) -> impl Iterator<Item = (MotorName, Conditions)>;
 
     /// Returns a setting of a drive that differs from the expected value, or is not known yet.
     fn wrong_setting(&self) -> Option<WrongSetting>;
@@ -295,7 +295,7 @@ impl Visitor for Survey<'_> {
     fn visit(&mut self, device: &mut impl CanDevice) {
         let found = &mut *self.found;
         found.missing.extend(device.missing(self.now));
-        found.faulty.extend(device.faulty());
+        found.faulty.extend_unfit(device.faulty());
         found.wrong_setting = found.wrong_setting.or_else(|| device.wrong_setting());
         found.second_master = found.second_master.or_else(|| device.second_master());
     }

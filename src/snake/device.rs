@@ -4,7 +4,8 @@ use super::slot::Slot;
 use super::{Joints, schedule};
 use crate::frame::CanFrame;
 use crate::motor::{
-    CanDevice, Claim, Condition, Devices, Guard, Ingest, MotorName, Visitor, WrongSetting,
+    CanDevice, Claim, Condition, Conditions, Devices, Guard, Ingest, MotorName, Visitor,
+    WrongSetting,
 };
 use crate::time::{Edge, Instant, Tick};
 use embedded_can::StandardId;
@@ -37,11 +38,8 @@ impl CanDevice for Joints {
 
     /// Each joint has one id, in both directions.
     fn claims(&self) -> impl Iterator<Item = Claim> {
-        let joints = || {
-            self.slots
-                .iter()
-                .filter_map(|slot| StandardId::new(u16::from(slot.id?)).zip(slot.name()))
-        };
+        let joint = |slot: &Slot| StandardId::new(u16::from(slot.id?)).zip(slot.name());
+        let joints = || self.slots.iter().filter_map(joint);
         let feedback = joints().map(|(id, name)| Claim::feedback(id, name));
         feedback.chain(joints().map(|(id, name)| Claim::command(id, name)))
     }
@@ -51,7 +49,7 @@ impl CanDevice for Joints {
     }
 
     /// A fault of a joint ends when the joint is armed again.
-    fn faulty(&self) -> impl Iterator<Item = MotorName> {
+    fn faulty(&self) -> impl Iterator<Item = (MotorName, Conditions)> {
         core::iter::empty()
     }
 

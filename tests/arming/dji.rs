@@ -114,7 +114,8 @@ fn arm_only_refuses_a_choice_with_a_faulty_motor_and_no_other() {
             bench.faulty(broken);
             let outcome = bench.only(&choice);
             if choice.contains(&broken) {
-                let refused = format!("not fit to be driven, see health(): M3508 #{id}");
+                let refused =
+                    format!("not fit to be driven, see health(): M3508 #{id} (ESC fault)");
                 assert_eq!((outcome, bench.armed()), (Err(refused), [false; 3]), "{choice:?}");
                 bench.wait(PAUSE_MS);
                 assert_eq!(bench.only(&choice), Ok(()), "{choice:?}: the fault is over");
@@ -250,7 +251,7 @@ fn a_whole_bus_refuses_what_one_of_its_motors_refuses() {
         bench.faulty(index);
         assert_eq!(
             arm(&mut bench),
-            Err(format!("not fit to be driven, see health(): M3508 #{id}"))
+            Err(format!("not fit to be driven, see health(): M3508 #{id} (ESC fault)"))
         );
         assert_eq!(bench.armed(), [false; 3]);
         bench.wait(PAUSE_MS);

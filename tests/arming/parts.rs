@@ -153,7 +153,7 @@ fn fault<D: Devices>(mut bench: Bench<D>, number: u8, case: &str) {
     bench.step(|other| Some(if other == number { faulty(other) } else { healthy(other) }));
     assert_eq!(
         bench.arm(),
-        Err(format!("not fit to be driven, see health(): mine #{number}")),
+        Err(format!("not fit to be driven, see health(): mine #{number} (ESC fault)")),
         "{case}"
     );
     bench.assert_rests(case);
@@ -173,7 +173,7 @@ fn tripped<D: Devices>(mut bench: Bench<D>, number: u8, case: &str) {
     assert_eq!(bench.edges(), [(number, Condition::Fault, true)], "{case}");
     assert_eq!(
         bench.arm(),
-        Err(format!("not fit to be driven, see health(): mine #{number}")),
+        Err(format!("not fit to be driven, see health(): mine #{number} (ESC fault)")),
         "{case}"
     );
     bench.step(|other| Some(healthy(other)));

@@ -4,8 +4,8 @@ use super::dji::OneModel;
 use super::*;
 use drivetrain::dji::M3508;
 use drivetrain::motor::{
-    CanDevice, Capabilities, Capability, Claim, Condition, Ingest, MotorName, Target, Visitor,
-    WrongSetting,
+    CanDevice, Capabilities, Capability, Claim, Condition, Conditions, Ingest, MotorName, Target,
+    Visitor, WrongSetting,
 };
 use drivetrain::sim::contract::{Rule, Violation};
 use drivetrain::time::{Duration, Edge, Instant, Tick};
@@ -102,7 +102,7 @@ impl CanDevice for Careless {
     fn superseded(&self) -> u32 {
         CanDevice::superseded(&self.0)
     }
-    fn faulty(&self) -> impl Iterator<Item = MotorName> {
+    fn faulty(&self) -> impl Iterator<Item = (MotorName, Conditions)> {
         self.0.faulty()
     }
     fn wrong_setting(&self) -> Option<WrongSetting> {
@@ -289,7 +289,7 @@ impl CanDevice for Slipping {
     fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName> {
         self.wheels.bus().missing(now)
     }
-    fn faulty(&self) -> impl Iterator<Item = MotorName> {
+    fn faulty(&self) -> impl Iterator<Item = (MotorName, Conditions)> {
         self.wheels.bus().faulty().filter(|_| self.slip != Slip::ArmsFaulty)
     }
     fn wrong_setting(&self) -> Option<WrongSetting> {

@@ -2,7 +2,7 @@
 
 use super::*;
 use drivetrain::motor::{
-    ArmError, CanDevice, Claim, Condition, Ingest, MotorName, Visitor, WrongSetting,
+    ArmError, CanDevice, Claim, Condition, Conditions, Ingest, MotorName, Visitor, WrongSetting,
 };
 use drivetrain::pwm::{Brushed, BrushedConfig, RcPwm};
 use drivetrain::time::{Duration, Edge, Instant, Tick};
@@ -180,7 +180,7 @@ impl<M: OnPins> CanDevice for Wired<M> {
     fn superseded(&self) -> u32 {
         0
     }
-    fn faulty(&self) -> impl Iterator<Item = MotorName> {
+    fn faulty(&self) -> impl Iterator<Item = (MotorName, Conditions)> {
         std::iter::empty()
     }
     fn wrong_setting(&self) -> Option<WrongSetting> {

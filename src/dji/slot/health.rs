@@ -212,7 +212,7 @@ fn hold_back(slot: &mut Slot) {
 
 /// Tells whether there is a motor that may be armed.
 pub(in crate::dji) fn is_fit(slot: &Slot) -> bool {
-    slot.facts.is_some() && !is_faulty(slot)
+    slot.facts.is_some() && unfit(slot).is_none()
 }
 
 /// Takes targets from now on, beginning at rest. A condition that relaxed the motor is detected anew.
@@ -339,9 +339,10 @@ pub(in crate::dji) fn report(slot: &Slot) -> Option<Health> {
     })
 }
 
-/// Tells whether the motor must not be armed.
-pub(in crate::dji) fn is_faulty(slot: &Slot) -> bool {
-    slot.health.forbids(slot.guard.latch().active())
+/// Returns a motor that must not be armed, with its conditions.
+pub(in crate::dji) fn unfit(slot: &Slot) -> Option<(MotorName, Conditions)> {
+    let conditions = slot.guard.latch().active();
+    Some((slot.name()?, conditions)).filter(|_| slot.health.forbids(conditions))
 }
 
 /// Mixes two numbers so that the upper bits change with each (Knuth's multiplicative hash).

@@ -35,13 +35,13 @@ fn a_device_sends_what_its_updates_give_and_takes_back_its_own_only() {
 #[test]
 fn a_device_names_who_is_faulty_and_who_else_commands_and_tells_edges() {
     fn check<D: Devices + CanDevice>(device: &mut D) {
-        assert_eq!(id_of(device.faulty()), None);
+        assert_eq!(id_of(device.faulty().map(|(name, _)| name)), None);
         assert_eq!((device.second_master(), Devices::next_edge(device)), (None, None));
         assert_eq!(Devices::ingest(device, &with_error(0x202, 3), at_ms(1)), Ingest::Taken);
         for ms in 2..20 {
             frames_of(device, ms);
         }
-        assert_eq!(id_of(device.faulty()), Some(2));
+        assert_eq!(id_of(device.faulty().map(|(name, _)| name)), Some(2));
         let edge = Devices::next_edge(device).unwrap();
         assert_eq!((edge.source.id(), edge.condition, edge.began), (2, Condition::Fault, true));
         let command = CanFrame::standard(0x200, [1; 8]).unwrap();

@@ -3,8 +3,8 @@
 use super::{Actuator, DriveProtocol, Offered, Order, Target};
 use crate::frame::CanFrame;
 use crate::motor::{
-    AngleDrive, CanDevice, Capabilities, Capability, Claim, Condition, Devices, Ingest, MotorName,
-    Repeat, TargetError, VelocityDrive, Visitor, WrongSetting,
+    AngleDrive, CanDevice, Capabilities, Capability, Claim, Condition, Conditions, Devices, Ingest,
+    MotorName, Repeat, TargetError, VelocityDrive, Visitor, WrongSetting,
 };
 use crate::time::{Edge, Instant, Tick, TimeStep};
 use crate::units::{Angle, AngularVelocity};
@@ -104,8 +104,9 @@ impl<M: DriveProtocol> CanDevice for Actuator<M> {
         self.guard.is_missing(now).then(|| self.motor.name()).into_iter()
     }
 
-    fn faulty(&self) -> impl Iterator<Item = MotorName> {
-        self.watch.is_faulty(&self.guard).then(|| self.motor.name()).into_iter()
+    fn faulty(&self) -> impl Iterator<Item = (MotorName, Conditions)> {
+        let unfit = || (self.motor.name(), self.guard.conditions());
+        self.watch.is_faulty(&self.guard).then(unfit).into_iter()
     }
 
     /// An armed motor has asked before, and asks again before its drive is enabled.
