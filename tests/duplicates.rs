@@ -198,3 +198,16 @@ fn a_second_master_that_is_ignored_is_no_second_drive() {
         bench.own.arm(bench.now()).unwrap();
     }
 }
+
+/// The application wants an edge alone, and takes the two for one.
+#[test]
+fn two_drives_that_are_only_reported_are_armed() {
+    static REPORTS: HealthConfig =
+        HealthConfig::new().with_reaction(Condition::DuplicateId, Reaction::Report);
+    let mut bench = damiao(1_000);
+    bench.own = bench.own.with_health(&REPORTS).unwrap();
+    bench.shown = 2;
+    bench.run(3_000);
+    assert!(bench.is_double());
+    bench.own.arm(bench.now()).unwrap();
+}

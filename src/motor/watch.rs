@@ -84,9 +84,9 @@ impl Watch {
 
     /// Tells whether a drive that answers each frame is known to be the only one with its id, or need not be.
     pub(crate) fn is_single(&self) -> bool {
-        let ignores = |condition| self.config.ignores(condition);
+        let forbids = self.config.forbids(Conditions::NONE.with(Condition::DuplicateId));
         // A second master that is ignored is answered too.
-        let need_not = ignores(Condition::DuplicateId) || ignores(Condition::SecondMaster);
+        let need_not = !forbids || self.config.ignores(Condition::SecondMaster);
         need_not || self.answers.are_of_one()
     }
 
