@@ -211,3 +211,60 @@ fn two_drives_that_are_only_reported_are_armed() {
     assert!(bench.is_double());
     bench.own.arm(bench.now()).unwrap();
 }
+
+/// A frame that the bus had no place for is not answered.
+#[test]
+fn two_drives_are_found_on_a_bus_with_room_for_a_part_of_the_frames() {
+    for percent in [90, 80, 70, 60, 55] {
+        for shown in [1, 2] {
+            let mut bench = damiao(1_000);
+            let late = Duration::from_millis(20);
+            let timeouts = Timeouts::new().with_feedback(late, Duration::from_millis(300)).unwrap();
+            bench.own = bench.own.with_timeouts(timeouts);
+            bench.shown = shown;
+            let mut room = 0;
+            for _ in 0..3_000 {
+                bench.now_us += 1_000;
+                bench.own.update(Tick::new(bench.now(), 0.001));
+                room += percent;
+                if room >= 100 {
+                    room -= 100;
+                    while let Some(frame) = bench.own.next_frame(0) {
+                        bench.deliver(&frame);
+                    }
+                }
+            }
+            assert_eq!(bench.is_double(), shown == 2, "{percent} %, {shown} drives");
+            assert_eq!(
+                bench.own.arm(bench.now()).is_ok(),
+                shown == 1,
+                "{percent} %, {shown} drives"
+            );
+        }
+    }
+}
+
+/// The rest of each disarming is answered too, and is one frame however often the program disarms.
+#[test]
+fn a_program_that_disarms_between_the_updates_has_one_drive_and_a_bus_with_room() {
+    for hz in [50, 100, 125, 200, 250, 500, 1_000] {
+        for (times, shown) in [(1, 1), (20, 1), (1, 2), (20, 2)] {
+            let mut bench = damiao(hz);
+            bench.shown = shown;
+            let mut sent = 0;
+            for _ in 0..5 * hz {
+                bench.tick();
+                for _ in 0..times {
+                    Devices::disarm(&mut bench.own);
+                    while let Some(frame) = bench.own.next_frame(0) {
+                        sent += 1;
+                        bench.deliver(&frame);
+                    }
+                }
+            }
+            assert_eq!(bench.is_double(), shown == 2, "{hz} Hz, {shown} drives");
+            assert!(sent <= 5 * hz, "{hz} Hz: {sent} frames in {} updates", 5 * hz);
+            assert_eq!(bench.own.arm(bench.now()).is_ok(), shown == 1, "{hz} Hz, {shown} drives");
+        }
+    }
+}

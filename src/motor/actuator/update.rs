@@ -184,6 +184,11 @@ impl<M: DriveProtocol> Actuator<M> {
         // A question that is given back from now on did not enable the drive, and rest that nobody took was not sent.
         self.switched.take_if(|_| self.power.is_confirmed() && self.switching.is_none());
         self.offered.is_rest &= !self.offered.waits;
+        // Of the frames taken since the update before, the drive answers a question without feedback.
+        if self.motor.frames_per_answer() == 1 {
+            let is_told = self.has_posted && self.switching.is_none() && self.switched.is_some();
+            self.watch.ask(u16::from(self.offered.is_rest) + u16::from(is_told));
+        }
         self.withdraw();
         self.has_posted = false;
         let was_on = self.power.is_on();
@@ -201,10 +206,6 @@ impl<M: DriveProtocol> Actuator<M> {
         // Between two frames of rest, another frame takes the place of one: the bus never has two of them at once to carry.
         let has_other = self.has_posted || inquiry.is_some();
         let gives_way = is_at_rest && self.offered.is_rest && has_other;
-        // The answer to a question is no feedback.
-        if self.motor.frames_per_answer() == 1 {
-            self.watch.ask(u16::from(self.has_posted) + u16::from(!gives_way));
-        }
         self.offer(if gives_way { inquiry } else { command });
         let is_rest = |frame: CanFrame| is_at_rest && !gives_way && !frame.is_remote();
         self.offered.is_rest = command.is_some_and(is_rest);
@@ -381,12 +382,13 @@ impl<M: DriveProtocol> Actuator<M> {
         if self.power.stop(self.guard.device.updated()) {
             self.disable();
         } else if self.offered.is_rest {
-            // At rest already: a program that disarms in each tick must not keep the questions from their turn.
+            // At rest already: a program that disarms in each tick must not keep the questions from their turn, nor fill the bus.
             return;
         }
         self.offered.is_rest = false;
         let rest = self.rest();
         self.offer(Some(rest));
+        self.offered.is_rest = !rest.is_remote();
     }
 
     /// Returns the frame of rest: no question unless rest was sent before.
