@@ -143,8 +143,9 @@ impl Motor {
     }
 
     /// Makes the present position zero; while the motor is disarmed, and the motor is not armed before the frame went out. The frame is sent
-    /// again if no driver took it. A driven motor forgets the request: the shaft would be elsewhere when the motor is disarmed. A RobStride
-    /// keeps the zero over a loss of the supply if [stored](Self::store), a CyberGear does not.
+    /// again if no driver took it, so keep the shaft at its zero until the motor can be armed. A driven motor forgets the request: the shaft
+    /// would be elsewhere when the motor is disarmed. A RobStride keeps the zero over a loss of the supply if [stored](Self::store), a
+    /// CyberGear does not.
     pub const fn set_zero(&mut self) {
         self.once = Some(Command::SetZero);
         self.settings.forget();
