@@ -282,7 +282,7 @@ impl DriveProtocol for Motor {
     }
 
     fn unsent(&mut self, frame: &CanFrame) {
-        if *frame == self.frame_of(Command::SetZero) {
+        if self.once.is_none() && *frame == self.frame_of(Command::SetZero) {
             self.set_zero();
         }
     }
