@@ -400,6 +400,32 @@ mod tests {
         guard
     }
 
+    /// By hand: 8 rad/s for the gap, beside one and a half times the velocity, or the way to the target at the speed limit, for 40 ms or more.
+    #[test]
+    fn a_shaft_turns_so_far_between_two_readings() {
+        let near = |one: f32, other: f32| assert!((one - other).abs() < 1e-6, "{one} of {other}");
+        near(furthest(0.01, 3.0, (0.0, 0.0)), 0.08 + 0.18);
+        near(furthest(0.1, 3.0, (0.0, 0.0)), 0.8 + 0.45);
+        near(furthest(0.1, 0.0, (100.0, 5.0)), 0.8 + 0.5);
+        near(furthest(0.1, 0.0, (0.2, 5.0)), 0.8 + 0.2);
+        near(furthest(0.1, 3.0, (0.2, 5.0)), 0.8 + 0.45);
+    }
+
+    #[test]
+    fn feedback_within_the_trusted_gap_is_in_time_once_the_motor_was_updated() {
+        let mut guard = driving();
+        guard.trust(5_000);
+        assert!(!guard.hear_in_time(at_ms(2)), "no update yet");
+        assert!(guard.drives(at_ms(2)));
+        assert!(!guard.hear_in_time(at_ms(3)), "nothing trusted");
+        guard.trust(5_000);
+        assert!(guard.hear_in_time(at_ms(3)));
+        assert!(!guard.hear_in_time(at_ms(9)));
+        guard.trust(0);
+        assert!(!guard.hear_in_time(at_ms(4)));
+        assert_eq!((guard.take_in_time(), guard.take_in_time()), (1, 0));
+    }
+
     #[test]
     fn a_pause_while_the_range_opens_leaves_it_open() {
         for pause_ms in [60_001, 2_400_000, 4_290_000] {
