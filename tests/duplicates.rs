@@ -268,3 +268,25 @@ fn a_program_that_disarms_between_the_updates_has_one_drive_and_a_bus_with_room(
         }
     }
 }
+
+/// A second drive comes while the motor is driven, and the program arms again as soon as it may.
+#[test]
+fn a_second_drive_that_comes_while_driven_is_not_armed_again() {
+    for (hz, pause_ms) in [(1_000, 105), (500, 105), (250, 105), (250, 250), (100, 105), (100, 500)]
+    {
+        let mut bench = damiao(hz);
+        bench.run(2_500);
+        bench.own.arm(bench.now()).unwrap();
+        bench.run(500);
+        bench.shown = 2;
+        bench.run(200);
+        Devices::disarm(&mut bench.own);
+        bench.run(pause_ms);
+        let mut ticks = 0;
+        while ticks < 3 * hz && bench.own.arm(bench.now()).is_err() {
+            bench.tick();
+            ticks += 1;
+        }
+        assert!(!bench.own.is_armed(), "{hz} Hz, {pause_ms} ms, after {ticks} updates");
+    }
+}

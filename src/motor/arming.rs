@@ -2,7 +2,7 @@
 
 #[cfg(feature = "hal")]
 use super::Guard;
-use super::{BusLoad, Claim, Conditions, MotorName};
+use super::{BusLoad, Claim, Condition, Conditions, MotorName};
 use crate::time::{Duration, Instant, Tick};
 
 /// The motors that prevent arming, by name.
@@ -12,7 +12,7 @@ pub struct Missing {
     names: [Option<MotorName>; Self::CAPACITY],
     total: u16,
     full_bus: Option<u16>,
-    /// What is wrong with them, if their feedback is not.
+    /// What is wrong with motors that have feedback.
     conditions: Conditions,
 }
 
@@ -50,6 +50,16 @@ impl Missing {
         Self { full_bus: load.and_then(BusLoad::of_full_bus), ..self }
     }
 
+    /// Says what to do about drives as delivered.
+    fn advise(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        if self.conditions.contains(Condition::DuplicateId) {
+            f.write_str(
+                "; two drives answer with one id: connect one at a time, and give each an id",
+            )?;
+        }
+        Ok(())
+    }
+
     fn add(&mut self, name: MotorName) {
         if let Some(place) = self.names.get_mut(usize::from(self.total)) {
             *place = Some(name);
@@ -62,9 +72,8 @@ impl Missing {
         self.names.iter().flatten().copied()
     }
 
-    /// Returns the load in percent, 100 or more, of a bus that may be too full for the feedback of every motor: the measured
-    /// worst case, rounded up. `None` if the bus has room, or its load is not known.
-    /// [`Runner::arm`](crate::runner::Runner::arm) knows the load from the second second on.
+    /// Returns the load in percent, 100 or more, of a bus that may be too full for the feedback of every motor: the measured worst case, rounded
+    /// up. `None` if the bus has room, or its load is not known: [`Runner::arm`](crate::runner::Runner::arm) knows it from the second second on.
     #[must_use]
     pub const fn full_bus(&self) -> Option<u16> {
         self.full_bus
@@ -85,9 +94,6 @@ impl core::fmt::Display for Missing {
         match usize::from(self.total).saturating_sub(Self::CAPACITY) {
             0 => {}
             more => write!(f, " and {more} more")?,
-        }
-        if !self.conditions.is_empty() {
-            write!(f, " ({})", self.conditions)?;
         }
         let Some(load) = self.full_bus else { return Ok(()) };
         write!(
@@ -118,18 +124,24 @@ pub enum ArmError {
     NoMotors,
     /// The driver takes no frames.
     BusDown,
-    /// A motor was relaxed since it was armed, and the last request to arm, or the relaxing, lies less than 100 ms back.
-    /// A request repeated in each tick is one request, and is not granted. Only updates with advancing time count.
+    /// A motor was relaxed since it was armed, and the last request to arm, or the relaxing, lies less than 100 ms back. A request repeated in
+    /// each tick is one request, and is not granted. Only updates with advancing time count.
     NotReleased,
 }
 
 impl core::fmt::Display for ArmError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Self::Missing(missing) => write!(f, "no feedback from {missing}"),
+            Self::Missing(missing) => {
+                write!(f, "no feedback from {missing}")?;
+                missing.advise(f)
+            }
             Self::Clash(one, other) => write!(f, "{one} clashes with {other}"),
             Self::SecondMaster(claim) => write!(f, "another node sends the {claim}"),
-            Self::Faulty(motors) => write!(f, "not fit to be driven, see health(): {motors}"),
+            Self::Faulty(motors) => {
+                write!(f, "not fit to be driven, see health(): {motors} ({})", motors.conditions)?;
+                motors.advise(f)
+            }
             Self::Setting(wrong) => write!(f, "{wrong}"),
             Self::Stopped => f.write_str("the emergency stop is set: call clear_emergency_stop"),
             Self::NoMotors => f.write_str("no motor is attached"),
@@ -213,8 +225,7 @@ impl Obstacles {
         Self::check(is_stopped, granted, |found| found.missing.extend(missing.into_iter()))
     }
 
-    // Inlined, so that a program that reads no names has no code for them.
-    #[inline]
+    #[inline] // A program that reads no names has no code for them.
     fn refusal(&self, granted: bool) -> Result<(), ArmError> {
         if !self.has_motors {
             return Err(ArmError::NoMotors);
@@ -227,7 +238,9 @@ impl Obstacles {
             return Err(ArmError::Setting(wrong));
         }
         if self.missing.total > 0 {
-            return Err(ArmError::Missing(self.missing));
+            // Of two drives with one id, the motor of the other has no feedback.
+            let conditions = self.faulty.conditions;
+            return Err(ArmError::Missing(Missing { conditions, ..self.missing }));
         }
         if let Some(claim) = self.second_master {
             return Err(ArmError::SecondMaster(claim));
@@ -300,9 +313,9 @@ impl core::fmt::Display for WrongSetting {
 
 /// The switch by which a person arms a robot: only its turn from off to on does.
 ///
-/// The position is unknown while a remote control is not heard. If the switch was turned on before, the robot [brakes](SwitchOrder::Brake)
-/// for a second, and is disarmed: a stop of category 1 in IEC 60204-1, where a robot that is disarmed at once rolls on for metres. A switch that is on at
-/// power-on, after the reset of a watchdog, or when the remote control is heard again, arms nothing until it was off.
+/// The position is unknown while a remote control is not heard. If the switch was turned on before, the robot [brakes](SwitchOrder::Brake) for a
+/// second, and is disarmed: a stop of category 1 in IEC 60204-1. Disarmed at once, a robot rolls on for metres. A switch that is on at power-on, after
+/// the reset of a watchdog, or when the remote control is heard again, arms nothing until it was off.
 ///
 /// # Examples
 /// ```
@@ -388,7 +401,6 @@ pub enum SwitchOrder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motor::Condition;
     use std::string::ToString;
 
     #[test]
@@ -399,7 +411,8 @@ mod tests {
         for (error, remedy) in [
             (ArmError::Stopped, "clear_emergency_stop"),
             (ArmError::NotReleased, "a clock that moves on"),
-            (ArmError::Faulty(faulty), "see health(): DM-J8009 #5 (duplicate id)"),
+            (ArmError::Faulty(faulty), "see health(): DM-J8009 #5 (duplicate id); two drives"),
+            (ArmError::Missing(faulty), "DM-J8009 #5; two drives answer with one id: connect one"),
         ] {
             assert!(error.to_string().contains(remedy), "{error}");
         }

@@ -124,6 +124,8 @@ impl Watch {
     pub(crate) fn start(&mut self, guard: &mut Guard, motor: MotorName, now: Instant) {
         self.part = motor.id();
         self.next = self.after(now);
+        // Nobody counts the answers of a drive that is driven.
+        self.forget_drive();
         guard.latch(now, |latch| self.monitor.start(latch));
     }
 

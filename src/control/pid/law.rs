@@ -43,7 +43,7 @@ impl Pid {
     /// Steps with a given error (from integers, on a circle) and the measured rate of change.
     ///
     /// D is `-kd * rate`, on the first call too. Period, tracking, feed-forward and the derivative of the error do not apply.
-    /// Everything else is as for [`step`](Self::step).
+    /// Everything else is as for [`step`](Self::step), whose tracking begins at the measurement after this.
     ///
     /// # Examples
     /// ```

@@ -39,6 +39,7 @@ impl<M: DriveProtocol> Actuator<M> {
         if self.power.hear(self.motor.is_enabled(), now) {
             self.fail(now);
             self.motor.forget_settings();
+            self.watch.forget_drive();
         }
         let gap_us = gap_us.unwrap_or(0);
         let is_silence = self.guard.is_silence(gap_us);
