@@ -29,8 +29,8 @@ use crate::motors::{COUNT, FACTS, INTEGRATOR, Motor, Target};
 use drivetrain::dji::{Bus, Counters};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    ArmError, CanDevice, Claim, Condition, Devices, Ingest, Link, MotorName, TargetError, Timeouts,
-    Visitor, WrongSetting,
+    ArmError, CanDevice, Claim, Condition, Conditions, Devices, Ingest, Link, MotorName,
+    TargetError, Timeouts, Visitor, WrongSetting,
 };
 use drivetrain::time::{Edge, TimeStep};
 use drivetrain::time::{Instant, Tick};
@@ -585,7 +585,7 @@ impl CanDevice for Watched {
         self.bus.missing(now)
     }
 
-    fn faulty(&self) -> impl Iterator<Item = MotorName> {
+    fn faulty(&self) -> impl Iterator<Item = (MotorName, Conditions)> {
         self.bus.faulty()
     }
 
