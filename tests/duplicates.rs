@@ -21,8 +21,11 @@ struct Bench<M> {
     shown: usize,
     period_us: u64,
     now_us: u64,
-    /// Frames of another controller in each update.
+    /// A frame of another controller in each update.
     rival: Option<CanFrame>,
+    /// The driver takes frames after so many of 100 updates.
+    percent: u64,
+    room: u64,
 }
 
 impl<M: DriveProtocol> Bench<M> {
@@ -32,7 +35,8 @@ impl<M: DriveProtocol> Bench<M> {
         let timeouts = Timeouts::new().with_feedback(late, Duration::from_millis(200)).unwrap();
         let own = Actuator::new(motor).with_timeouts(timeouts);
         let drives = (0..2).map(|_| Box::new(drive()) as Box<dyn Drive>).collect();
-        Self { own, drives, shown: 1, period_us: 1_000_000 / hz, now_us: 0, rival: None }
+        let period_us = 1_000_000 / hz;
+        Self { own, drives, shown: 1, period_us, now_us: 0, rival: None, percent: 100, room: 0 }
     }
 
     fn now(&self) -> Instant {
@@ -48,6 +52,16 @@ impl<M: DriveProtocol> Bench<M> {
         }
     }
 
+    /// The driver takes all frames; returns how many.
+    fn send(&mut self) -> u64 {
+        let mut sent = 0;
+        while let Some(frame) = self.own.next_frame(0) {
+            self.deliver(&frame);
+            sent += 1;
+        }
+        sent
+    }
+
     fn run(&mut self, ms: u64) {
         for _ in 0..ms * 1_000 / self.period_us {
             // Of the kind that the mode takes; refused by a disarmed motor.
@@ -61,8 +75,10 @@ impl<M: DriveProtocol> Bench<M> {
         self.now_us += self.period_us;
         let dt_s = self.period_us as f32 * 1e-6;
         self.own.update(Tick::new(self.now(), dt_s));
-        while let Some(frame) = self.own.next_frame(0) {
-            self.deliver(&frame);
+        self.room += self.percent;
+        if self.room >= 100 {
+            self.room -= 100;
+            self.send();
         }
         if let Some(frame) = self.rival {
             let now = self.now();
@@ -221,19 +237,8 @@ fn two_drives_are_found_on_a_bus_with_room_for_a_part_of_the_frames() {
             let late = Duration::from_millis(20);
             let timeouts = Timeouts::new().with_feedback(late, Duration::from_millis(300)).unwrap();
             bench.own = bench.own.with_timeouts(timeouts);
-            bench.shown = shown;
-            let mut room = 0;
-            for _ in 0..3_000 {
-                bench.now_us += 1_000;
-                bench.own.update(Tick::new(bench.now(), 0.001));
-                room += percent;
-                if room >= 100 {
-                    room -= 100;
-                    while let Some(frame) = bench.own.next_frame(0) {
-                        bench.deliver(&frame);
-                    }
-                }
-            }
+            (bench.shown, bench.percent) = (shown, percent);
+            (0..3_000).for_each(|_| bench.tick());
             assert_eq!(bench.is_double(), shown == 2, "{percent} %, {shown} drives");
             assert_eq!(
                 bench.own.arm(bench.now()).is_ok(),
@@ -256,10 +261,7 @@ fn a_program_that_disarms_between_the_updates_has_one_drive_and_a_bus_with_room(
                 bench.tick();
                 for _ in 0..times {
                     Devices::disarm(&mut bench.own);
-                    while let Some(frame) = bench.own.next_frame(0) {
-                        sent += 1;
-                        bench.deliver(&frame);
-                    }
+                    sent += bench.send();
                 }
             }
             assert_eq!(bench.is_double(), shown == 2, "{hz} Hz, {shown} drives");

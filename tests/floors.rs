@@ -486,7 +486,7 @@ fn the_pid_is_half_of_the_controllers_that_it_replaced() {
     let lines = lines_of(&folder);
     let law = fs::read_to_string(folder.join("law.rs")).unwrap();
     let (law, _) = law.split_once("#[cfg(test)]").unwrap();
-    // The functions, private ones too, that return the output of a step: an output has no name beside it.
+    // Private functions count too, if they take a time step and return one number: the output.
     let is_step = |function: &&str| {
         let (head, _) = function.split_once(" {\n").unwrap();
         let returns = ["-> f32", "-> Result<f32", "-> Option<f32"];

@@ -520,29 +520,36 @@ impl Named for Motor {
     }
 }
 
-/// The program sets the zero and arms in the same tick: the joint would be led to angles from the zero before.
-#[test]
-fn a_zero_that_was_not_sent_yet_holds_up_arming() {
+/// The shaft is at 2 rad, where a zero was asked for and not sent.
+fn asked_for_a_zero() -> Bench {
     let mut bench = Bench::new(operation());
     bench.drive.shaft_mut().set_angle(2.0);
     bench.steps(300, |_| {});
     bench.own.motor_mut().set_zero();
+    bench
+}
+
+fn assert_at_zero(bench: &Bench) {
+    assert!(bench.drive.shaft().angle_rad().abs() < 0.1, "{}", bench.drive.shaft().angle_rad());
+}
+
+/// The program sets the zero and arms in the same tick: the joint would be led to angles from the zero before.
+#[test]
+fn a_zero_that_was_not_sent_yet_holds_up_arming() {
+    let mut bench = asked_for_a_zero();
     let refused = bench.own.arm(bench.now()).unwrap_err().to_string();
     assert!(refused.starts_with("RS02 #1 has not answered yet what its "), "{refused}");
     bench.steps(200, |bench| _ = bench.own.set_torque(0.0));
-    assert!(bench.drive.shaft().angle_rad().abs() < 0.1, "{}", bench.drive.shaft().angle_rad());
+    assert_at_zero(&bench);
     bench.own.arm(bench.now()).unwrap();
     bench.steps(100, |bench| bench.own.set_torque(0.0).unwrap());
-    assert!(bench.drive.shaft().angle_rad().abs() < 0.1, "{}", bench.drive.shaft().angle_rad());
+    assert_at_zero(&bench);
 }
 
 /// The driver refuses the frame with the zero, and takes all others.
 #[test]
 fn a_zero_that_no_driver_took_is_sent_later() {
-    let mut bench = Bench::new(operation());
-    bench.drive.shaft_mut().set_angle(2.0);
-    bench.steps(300, |_| {});
-    bench.own.motor_mut().set_zero();
+    let mut bench = asked_for_a_zero();
     let mut refused = 0;
     for _ in 0..200 {
         if refused == 3 {
@@ -566,5 +573,5 @@ fn a_zero_that_no_driver_took_is_sent_later() {
     assert!((bench.drive.shaft().angle_rad() - 2.0).abs() < 0.1, "not sent yet");
     assert!(bench.own.arm(bench.now()).is_err());
     bench.steps(200, |bench| _ = bench.own.set_torque(0.0));
-    assert!(bench.drive.shaft().angle_rad().abs() < 0.1, "{}", bench.drive.shaft().angle_rad());
+    assert_at_zero(&bench);
 }

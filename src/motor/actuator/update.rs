@@ -36,14 +36,13 @@ impl<M: DriveProtocol> Actuator<M> {
         let gap_us = self.guard.gap_us(now);
         self.watch.hear(gap_us, now);
         self.guard.hear(now);
-        if self.power.hear(self.motor.is_enabled(), now) {
+        let has_reset = self.power.hear(self.motor.is_enabled(), now);
+        if has_reset {
             self.fail(now);
-            self.motor.forget_settings();
-            self.watch.forget_drive();
         }
         let gap_us = gap_us.unwrap_or(0);
         let is_silence = self.guard.is_silence(gap_us);
-        if is_silence {
+        if has_reset || is_silence {
             self.motor.forget_settings();
             self.watch.forget_drive();
         }
@@ -185,7 +184,7 @@ impl<M: DriveProtocol> Actuator<M> {
         // A question that is given back from now on did not enable the drive, and rest that nobody took was not sent.
         self.switched.take_if(|_| self.power.is_confirmed() && self.switching.is_none());
         self.offered.is_rest &= !self.offered.waits;
-        // Of the frames taken since the update before, the drive answers a question without feedback.
+        // Frames taken since the update before count, but for a question, whose answer is no feedback.
         if self.motor.frames_per_answer() == 1 {
             let is_told = self.has_posted && self.switching.is_none() && self.switched.is_some();
             self.watch.ask(u16::from(self.offered.is_rest) + u16::from(is_told));
