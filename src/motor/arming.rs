@@ -12,7 +12,7 @@ pub struct Missing {
     names: [Option<MotorName>; Self::CAPACITY],
     total: u16,
     full_bus: Option<u16>,
-    /// What is wrong with motors that have feedback.
+    /// The conditions of the motors that have feedback and are not fit to be driven.
     conditions: Conditions,
 }
 

@@ -183,8 +183,8 @@ impl ErrorPid {
         Ok(self.keep(output, error, rate, integral))
     }
 
-    /// P and the growth of the integral, as weights and dead band leave them. The growth is not finite in a first call and in a frozen step,
-    /// whatever the weight.
+    /// P and the growth of the integral, as weights and dead band leave them. No weight makes the growth of a first call or of a frozen step
+    /// finite.
     #[inline(always)]
     fn weighted(&self, error: f32, step: &TimeStep) -> (f32, f32) {
         let p = &self.parameters;
