@@ -26,6 +26,9 @@ struct Bench<M> {
     /// The driver takes frames after so many of 100 updates.
     percent: u64,
     room: u64,
+    /// Each n-th answer is lost on reception; 0 for none.
+    lost: u64,
+    heard: u64,
 }
 
 impl<M: DriveProtocol> Bench<M> {
@@ -36,7 +39,18 @@ impl<M: DriveProtocol> Bench<M> {
         let own = Actuator::new(motor).with_timeouts(timeouts);
         let drives = (0..2).map(|_| Box::new(drive()) as Box<dyn Drive>).collect();
         let period_us = 1_000_000 / hz;
-        Self { own, drives, shown: 1, period_us, now_us: 0, rival: None, percent: 100, room: 0 }
+        Self {
+            own,
+            drives,
+            shown: 1,
+            period_us,
+            now_us: 0,
+            rival: None,
+            percent: 100,
+            room: 0,
+            lost: 0,
+            heard: 0,
+        }
     }
 
     fn now(&self) -> Instant {
@@ -46,7 +60,9 @@ impl<M: DriveProtocol> Bench<M> {
     fn deliver(&mut self, frame: &CanFrame) {
         let now = self.now();
         for drive in self.drives.iter_mut().take(self.shown) {
-            if let Some(answer) = drive.hear(frame) {
+            let Some(answer) = drive.hear(frame) else { continue };
+            self.heard += 1;
+            if self.lost == 0 || !self.heard.is_multiple_of(self.lost) {
                 _ = Devices::ingest(&mut self.own, &answer, now);
             }
         }
@@ -290,5 +306,39 @@ fn a_second_drive_that_comes_while_driven_is_not_armed_again() {
             ticks += 1;
         }
         assert!(!bench.own.is_armed(), "{hz} Hz, {pause_ms} ms, after {ticks} updates");
+    }
+}
+
+/// Both drives are silent for less than the 100 ms after which the drive may be another one.
+#[test]
+fn two_drives_stay_two_over_a_gap() {
+    for hz in [250, 500, 1_000, 2_000] {
+        for gap_ms in (8..=96).step_by(8) {
+            let mut bench = damiao(hz);
+            bench.shown = 2;
+            bench.run(3_000);
+            assert!(bench.is_double(), "{hz} Hz");
+            bench.shown = 0;
+            bench.run(gap_ms);
+            bench.shown = 2;
+            for _ in 0..2 * hz {
+                bench.tick();
+                let refused = bench.own.arm(bench.now());
+                assert!(refused.is_err() && bench.is_double(), "{hz} Hz, {gap_ms} ms");
+            }
+        }
+    }
+}
+
+/// The receive buffer of the controller overflows.
+#[test]
+fn two_drives_are_found_while_each_third_answer_is_lost() {
+    for hz in [250, 500, 1_000] {
+        for (lost, shown) in [(3, 1), (3, 2), (4, 1), (4, 2), (10, 1), (10, 2)] {
+            let mut bench = damiao(hz);
+            (bench.lost, bench.shown) = (lost, shown);
+            bench.run(3_000);
+            assert_eq!(bench.is_double(), shown == 2, "{hz} Hz, {lost}, {shown} drives");
+        }
     }
 }

@@ -155,12 +155,13 @@ impl Watch {
         if self.traffic.end_window(&mut self.window_from, now) {
             guard.trust(0);
         }
-        if guard.is_armed() {
+        let is_online = guard.link() == Link::Online;
+        // A frame that nobody answers tells nothing of a second drive.
+        if guard.is_armed() || !is_online {
             self.answers.begin();
         } else if self.answers.are_enough() {
             self.compare_answers(guard, now);
         }
-        let is_online = guard.link() == Link::Online;
         let since = if is_online { self.begin_slow(guard.is_armed(), &vitals, now) } else { None };
         let passes = |since| self.monitor.passes(&vitals.sample(since, self.config), self.config);
         if is_well && since.is_some_and(passes) {

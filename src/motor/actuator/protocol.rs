@@ -191,7 +191,7 @@ pub trait DriveProtocol {
     /// the drive sends its feedback by itself; 1 if the drive answers each frame; 2 if the drive answers questions alone, since a
     /// question stands between two other frames.
     ///
-    /// With 1, more feedback than one and a half times the frames comes from two drives with one id: such a motor is not armed, nor is any
+    /// With 1, more feedback than one and a quarter times the frames comes from two drives with one id: such a motor is not armed, nor is any
     /// before 64 frames were answered by one drive.
     fn frames_per_answer(&self) -> u32 {
         0

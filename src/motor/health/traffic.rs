@@ -137,7 +137,7 @@ pub(crate) struct Answers {
 }
 
 impl Answers {
-    /// So many frames are compared with the feedback: more than half as much again comes from two drives.
+    /// So many frames are compared with the feedback: more than a quarter beyond one answer each comes from two drives.
     const ENOUGH: u16 = 64;
 
     pub(crate) const NONE: Self = Self { asked: 0, answered: 0, are_of_one: false };
@@ -162,7 +162,7 @@ impl Answers {
 
     /// Compares both numbers, and begins anew.
     pub(crate) fn compare(&mut self) {
-        self.are_of_one = 2 * u32::from(self.answered) <= 3 * u32::from(self.asked);
+        self.are_of_one = 4 * u32::from(self.answered) <= 5 * u32::from(self.asked);
         self.begin();
     }
 
