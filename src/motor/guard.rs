@@ -3,7 +3,7 @@
 use super::age;
 use super::safety::{DeviceGuard, MotorGuard, OPENING};
 use crate::math::limited;
-use crate::motor::{Condition, Link, TargetError, Timeouts};
+use crate::motor::{Condition, Conditions, HealthConfig, Link, TargetError, Timeouts};
 use crate::time::{Duration, Instant};
 
 /// After a silence of so long a drive may have started again, in µs.
@@ -373,6 +373,25 @@ impl Guard {
     /// Ends the quiet time here, if the quiet time lasts longer: the next update then applies the rules.
     pub(crate) fn wake_at(&mut self, time: Instant) {
         self.device.wake_at(time);
+    }
+}
+
+/// Consequences of the conditions of a motor.
+impl MotorGuard {
+    /// Begins a condition that is not ignored.
+    pub(crate) fn begin(&mut self, condition: Condition, config: &HealthConfig) {
+        let before = self.latch_mut().active();
+        if !config.ignores(condition) {
+            self.latch_mut().set(condition, true);
+        }
+        self.react(before, config);
+    }
+
+    /// Trips the motor if a condition that began since `before` demands rest, or the motor must not be armed.
+    pub(crate) const fn react(&mut self, before: Conditions, config: &HealthConfig) {
+        if config.relaxes(before, self.latch_mut().active()) {
+            self.trip();
+        }
     }
 }
 

@@ -112,7 +112,7 @@ impl Watch {
         if !self.config.ignores(Condition::SecondMaster) {
             guard.note(Condition::SecondMaster, true, now);
         }
-        self.react(guard, before);
+        guard.change(now, |motor| motor.react(before, self.config));
     }
 
     /// Tells whether the motor must not be armed.
@@ -203,15 +203,8 @@ impl Watch {
                 }
             });
         }
-        self.react(guard, before);
+        guard.change(now, |motor| motor.react(before, self.config));
         self.share
-    }
-
-    /// Relaxes the motor if its configuration says so.
-    fn react(&self, guard: &mut Guard, before: Conditions) {
-        if self.config.relaxes(before, guard.conditions()) {
-            guard.relax_until_armed();
-        }
     }
 
     /// Returns the time since the last check of the slow quantities, if a check is due.

@@ -179,9 +179,8 @@ const COUNTS: [(&str, &str, &[&str]); 24] = [
 ];
 
 /// Calls by which a motor trips, by file: how many, and why.
-const TRIPS: [(&str, usize, &str); 8] = [
+const TRIPS: [(&str, usize, &str); 7] = [
     ("dji/device.rs", 1, "the runner trips all motors"),
-    ("dji/slot/health.rs", 1, "a condition relaxes, as its configuration says"),
     ("motor/actuator/device.rs", 1, "the runner trips the motor"),
     ("motor/actuator/update.rs", 1, "the drive started again, or has a wrong setting"),
     ("motor/actuator/update.rs", 1, "the joint lost its zero"),
@@ -191,11 +190,11 @@ const TRIPS: [(&str, usize, &str); 8] = [
 ];
 
 /// Words of the rules, as a name begins with them.
-const WORDS: [&str; 33] = [
-    "age", "arm", "block", "cooldown", "deadline", "debounce", "disarm", "edge", "expire",
-    "foreign", "fresh", "gate", "gesture", "gone", "grace", "heard", "held", "hold", "inhibit",
-    "latch", "late", "lost", "master", "offline", "old", "open", "permit", "ramp", "recover",
-    "rival", "silen", "stale", "trip",
+const WORDS: [&str; 35] = [
+    "age", "arm", "block", "cooldown", "deadline", "debounce", "disarm", "double", "duplic",
+    "edge", "expire", "foreign", "fresh", "gate", "gesture", "gone", "grace", "heard", "held",
+    "hold", "inhibit", "latch", "late", "lost", "master", "offline", "old", "open", "permit",
+    "ramp", "recover", "rival", "silen", "stale", "trip",
 ];
 
 /// More words, of names that are no rule as often: exact.

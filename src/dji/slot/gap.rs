@@ -75,10 +75,9 @@ fn compare(slot: &mut Slot, feedback: Feedback, gap_us: u32) {
     let counts = shortest(slot.feedback.angle(), feedback.angle());
     #[expect(clippy::cast_possible_truncation, reason = "saturates")]
     slot.traffic.compare(counts, predicted as i32, tolerance as i32);
-    if slot.traffic.is_double() && !slot.health.ignores(Condition::DuplicateId) {
-        let before = slot.guard.latch().active();
-        health::begin(slot, Condition::DuplicateId);
-        health::react(slot, before);
+    if slot.traffic.is_double() {
+        slot.guard.begin(Condition::DuplicateId, slot.health);
+        slot.require_check();
     }
 }
 

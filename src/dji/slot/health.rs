@@ -121,7 +121,7 @@ pub(in crate::dji) fn check(slot: &mut Slot, seen: &Surroundings) {
     }
     if !slot.guard.latch().active().is_empty() || slot.error_code != 0 {
         slot.require_check();
-        react(slot, before);
+        slot.guard.react(before, slot.health);
     } else if slot.cool_below == 0 {
         waive_check(slot, facts);
     }
@@ -138,7 +138,7 @@ pub(in crate::dji) fn hear_error(slot: &mut Slot, facts: &Facts, code: u8) {
         let before = slot.guard.latch().active();
         take_error(slot, facts, code);
         slot.require_check();
-        react(slot, before);
+        slot.guard.react(before, slot.health);
     }
 }
 
@@ -272,20 +272,10 @@ fn close_window(slot: &mut Slot, window: u16, feedback_hz: u32) {
     }
 }
 
-/// Relaxes the motor if its configuration says so.
-pub(super) fn react(slot: &mut Slot, before: Conditions) {
-    if slot.health.relaxes(before, slot.guard.latch().active()) {
-        slot.guard.trip();
-    }
-}
-
 /// Notes a command frame of the motor from another node.
 pub(in crate::dji) fn hear_rival(slot: &mut Slot) {
-    if !slot.health.ignores(Condition::SecondMaster) {
-        let before = slot.guard.latch().active();
-        begin(slot, Condition::SecondMaster);
-        react(slot, before);
-    }
+    slot.guard.begin(Condition::SecondMaster, slot.health);
+    slot.require_check();
 }
 
 /// Returns the state; `None` before the first frame.
