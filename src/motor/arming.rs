@@ -278,7 +278,7 @@ pub struct WrongSetting {
     pub setting: &'static str,
     /// The value in the configuration of the motor, in the unit of the manual.
     pub expected: f32,
-    /// The value in the drive; `None` if the drive has not answered yet, NaN if the drive did not answer on the way to be enabled, or
+    /// The value in the drive; `None` if the value is not known yet, NaN if the drive did not answer on the way to be enabled, or
     /// does not have the setting.
     pub found: Option<f32>,
 }
@@ -306,7 +306,7 @@ impl core::fmt::Display for WrongSetting {
                 f,
                 "{motor} has {setting} {found}, the program needs {expected}: write it, or change the configuration"
             ),
-            None => write!(f, "{motor} has not answered yet what its {setting} is"),
+            None => write!(f, "{motor}: its {setting} is not known yet, ask again"),
         }
     }
 }

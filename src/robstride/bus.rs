@@ -57,7 +57,7 @@ pub struct Motor {
     /// Faults were cleared since then.
     has_cleared: bool,
     settings: Settings<Register, 3>,
-    /// A command to be sent once at rest. The settings are unknown until then: a motor that is armed before would forget the command.
+    /// A command to be sent once at rest. The settings are unknown until then: the position changes with the zero, and all with the id.
     once: Option<Command>,
     /// Counts questions.
     questions: u8,
@@ -142,16 +142,16 @@ impl Motor {
         Ok(())
     }
 
-    /// Makes the present position zero; while the motor is disarmed, and the motor is not armed before the frame went out. The frame is sent
-    /// again if no driver took it, so keep the shaft at its zero until the motor can be armed. A driven motor forgets the request: the shaft
-    /// would be elsewhere when the motor is disarmed. A RobStride keeps the zero over a loss of the supply if [stored](Self::store), a
+    /// Makes the present position zero; while the motor has no target. A disarmed motor is not armed before the frame went out. The frame is
+    /// sent again if no driver took it, so keep the shaft at its zero until the motor can be armed. A driven motor forgets the request: the
+    /// shaft would be elsewhere when the motor is disarmed. A RobStride keeps the zero over a loss of the supply if [stored](Self::store), a
     /// CyberGear does not.
     pub const fn set_zero(&mut self) {
         self.once = Some(Command::SetZero);
         self.settings.forget();
     }
 
-    /// Gives the drive another id, 1 to 127, at once; while the motor is disarmed. The frame goes out once, and a driven motor forgets the
+    /// Gives the drive another id, 1 to 127, at once; while the motor has no target. The frame goes out once, and a driven motor forgets the
     /// request. This motor then hears no more of the drive: make another motor.
     ///
     /// # Errors

@@ -30,9 +30,12 @@ fn a_motor_is_armed_when_its_settings_have_been_read() {
     let refused = |bench: &mut Bench| bench.own.arm(bench.now()).unwrap_err().to_string();
     assert_eq!(refused(&mut bench), "no feedback from DM-J4310 #1");
     bench.steps(5, |_| {});
-    assert!(refused(&mut bench).starts_with("DM-J4310 #1 has not answered yet what its "));
+    assert!(refused(&mut bench).starts_with("DM-J4310 #1: its "));
     bench.steps(60, |_| {});
-    assert_eq!(refused(&mut bench), "DM-J4310 #1 has not answered yet what its id is", "alone?");
+    assert_eq!(
+        refused(&mut bench),
+        "DM-J4310 #1: its number of drives is not known yet, ask again"
+    );
     bench.steps(60, |_| {});
     assert_eq!(bench.own.arm(bench.now()), Ok(()));
 }

@@ -41,9 +41,12 @@ fn a_motor_is_armed_when_its_state_has_been_read() {
     let refused = |bench: &mut Bench| bench.own.arm(bench.now()).unwrap_err().to_string();
     assert_eq!(refused(&mut bench), "no feedback from MF9025-16T #1");
     bench.steps(5, |_| {});
-    assert_eq!(refused(&mut bench), "MF9025-16T #1 has not answered yet what its motorState is");
+    assert_eq!(refused(&mut bench), "MF9025-16T #1: its motorState is not known yet, ask again");
     bench.steps(40, |_| {});
-    assert_eq!(refused(&mut bench), "MF9025-16T #1 has not answered yet what its id is", "alone?");
+    assert_eq!(
+        refused(&mut bench),
+        "MF9025-16T #1: its number of drives is not known yet, ask again"
+    );
     bench.steps(80, |_| {});
     assert_eq!(bench.own.arm(bench.now()), Ok(()));
     assert!(!bench.drive.is_on(), "switched off at the start, and on when it is driven");

@@ -49,7 +49,7 @@ fn a_motor_is_armed_when_its_heartbeat_says_that_it_is_idle() {
         assert_eq!(refused(&mut bench), "no feedback from D6374 #3");
         bench.lost = Some(1);
         bench.steps(50, |_| {});
-        assert_eq!(refused(&mut bench), "D6374 #3 has not answered yet what its axis state is");
+        assert_eq!(refused(&mut bench), "D6374 #3: its axis state is not known yet, ask again");
         bench.lost = None;
         bench.steps(150, |_| {});
         assert_eq!(bench.own.arm(bench.now()), Ok(()));

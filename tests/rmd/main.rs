@@ -41,7 +41,7 @@ fn a_motor_is_armed_when_its_state_and_its_angle_have_been_read() {
     let refused = |bench: &mut Bench| bench.own.arm(bench.now()).unwrap_err().to_string();
     assert_eq!(refused(&mut bench), "no feedback from RMD-X8-120 #1");
     bench.steps(5, |_| {});
-    assert_eq!(refused(&mut bench), "RMD-X8-120 #1 has not answered yet what its errorState is");
+    assert_eq!(refused(&mut bench), "RMD-X8-120 #1: its errorState is not known yet, ask again");
     bench.steps(150, |_| {});
     assert_eq!(bench.own.arm(bench.now()), Ok(()));
     assert_eq!(bench.drive.timeout_ms(), 0, "written when it is to be driven");

@@ -49,7 +49,7 @@ fn a_motor_is_armed_when_its_settings_have_been_read() {
     let refused = |bench: &mut Bench| bench.own.arm(bench.now()).unwrap_err().to_string();
     assert_eq!(refused(&mut bench), "no feedback from RS02 #1");
     bench.steps(5, |_| {});
-    assert!(refused(&mut bench).starts_with("RS02 #1 has not answered yet what its "));
+    assert!(refused(&mut bench).starts_with("RS02 #1: its "));
     bench.steps(100, |_| {});
     assert_eq!(bench.own.arm(bench.now()), Ok(()));
 }
@@ -538,7 +538,7 @@ fn assert_at_zero(bench: &Bench) {
 fn a_zero_that_was_not_sent_yet_holds_up_arming() {
     let mut bench = asked_for_a_zero();
     let refused = bench.own.arm(bench.now()).unwrap_err().to_string();
-    assert!(refused.starts_with("RS02 #1 has not answered yet what its "), "{refused}");
+    assert!(refused.starts_with("RS02 #1: its "), "{refused}");
     bench.steps(200, |bench| _ = bench.own.set_torque(0.0));
     assert_at_zero(&bench);
     bench.own.arm(bench.now()).unwrap();

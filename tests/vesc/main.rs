@@ -328,7 +328,7 @@ fn a_motor_is_armed_when_the_drive_has_said_that_it_has_no_fault() {
     let now = bench.now();
     let status = bench.drive.report(9).unwrap();
     _ = Devices::ingest(&mut bench.own, &status, now);
-    assert_eq!(refused(&mut bench), "6374 #23 has not answered yet what its fault code is");
+    assert_eq!(refused(&mut bench), "6374 #23: its fault code is not known yet, ask again");
     bench.steps(200, |bench| bench.drive.fail(7));
     assert!(refused(&mut bench).contains("6374 #23"), "{}", refused(&mut bench));
     bench.steps(800, |_| {});
@@ -610,7 +610,7 @@ fn a_drive_that_no_longer_answers_is_not_armed() {
         assert!(ms < 60 || bench.own.motor().feedback().fault.is_none());
     }
     let refused = bench.own.arm(bench.now()).unwrap_err().to_string();
-    assert_eq!(refused, "6374 #23 has not answered yet what its fault code is");
+    assert_eq!(refused, "6374 #23: its fault code is not known yet, ask again");
 }
 
 /// Late feedback makes the motor forget what it knows of the drive, but not how often the count has wrapped: 2^32 is no whole

@@ -116,9 +116,8 @@ impl<M: DriveProtocol> CanDevice for Actuator<M> {
         }
         // Two drives as delivered have one id.
         let is_single = self.motor.frames_per_answer() != 1 || self.watch.is_single();
-        let name = self.motor.name();
-        let id = || WrongSetting::new(name, "id", name.id().into(), None);
-        self.motor.wrong_setting().or_else(|| (!is_single).then(id))
+        let drives = || WrongSetting::new(self.motor.name(), "number of drives", 1.0, None);
+        self.motor.wrong_setting().or_else(|| (!is_single).then(drives))
     }
 
     fn second_master(&self) -> Option<Claim> {
