@@ -311,11 +311,11 @@ impl core::fmt::Display for WrongSetting {
     }
 }
 
-/// The switch by which a person arms a robot: only its turn from off to on does.
+/// The switch by which a person arms a robot: only its turn from off to on does, and none with a stick held, for the robot would leap.
 ///
 /// The position is unknown while a remote control is not heard. If the switch was turned on before, the robot [brakes](SwitchOrder::Brake) for a
 /// second, and is disarmed: a stop of category 1 in IEC 60204-1. Disarmed at once, a robot rolls on for metres. A switch that is on at power-on, after
-/// the reset of a watchdog, or when the remote control is heard again, arms nothing until it was off.
+/// the reset of a watchdog, after a turn with a stick held, or when the remote control is heard again, arms nothing until it was off.
 ///
 /// # Examples
 /// ```
@@ -324,13 +324,12 @@ impl core::fmt::Display for WrongSetting {
 ///
 /// let at_ms = |ms: u64| Tick::new(Instant::from_micros(ms * 1_000), 0.001);
 /// let mut switch = ArmingSwitch::new();
-/// assert_eq!(switch.read(Some(true), at_ms(1)), SwitchOrder::Keep); // on at power-on: disarmed, as it was
-/// assert_eq!(switch.read(Some(false), at_ms(2)), SwitchOrder::Disarm);
-/// assert_eq!(switch.read(Some(true), at_ms(3)), SwitchOrder::Arm);
-/// assert_eq!(switch.read(None, at_ms(4)), SwitchOrder::Brake); // not heard
-/// assert_eq!(switch.read(Some(true), at_ms(1_003)), SwitchOrder::Brake); // heard again, and nobody has turned the switch
-/// assert_eq!(switch.read(Some(true), at_ms(1_004)), SwitchOrder::Disarm);
-/// assert_eq!(switch.read(Some(true), at_ms(1_005)), SwitchOrder::Keep);
+/// assert_eq!(switch.read(Some(true), true, at_ms(1)), SwitchOrder::Keep); // on at power-on: disarmed, as it was
+/// assert_eq!(switch.read(Some(false), true, at_ms(2)), SwitchOrder::Disarm);
+/// assert_eq!(switch.read(Some(true), true, at_ms(3)), SwitchOrder::Arm); // with the sticks at rest
+/// assert_eq!(switch.read(None, true, at_ms(4)), SwitchOrder::Brake); // not heard
+/// assert_eq!(switch.read(Some(true), true, at_ms(1_004)), SwitchOrder::Disarm); // heard again, and nobody has turned the switch
+/// assert_eq!(switch.read(Some(true), true, at_ms(1_005)), SwitchOrder::Keep);
 /// ```
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -362,21 +361,21 @@ impl ArmingSwitch {
         Self { position: SwitchPosition::Unknown }
     }
 
-    /// Takes the position, on or off, and `None` while it is not known: once a tick.
+    /// Takes the position, on or off, and `None` while it is not known, and whether the robot is asked for no motion: once a tick.
     #[must_use]
-    pub fn read(&mut self, is_on: Option<bool>, tick: Tick) -> SwitchOrder {
+    pub fn read(&mut self, is_on: Option<bool>, is_at_rest: bool, tick: Tick) -> SwitchOrder {
+        use SwitchPosition::{Lost, Off, On, Unknown};
         let now = tick.now();
         let (position, order) = match (self.position, is_on) {
-            (_, Some(false)) => (SwitchPosition::Off, SwitchOrder::Disarm),
-            (SwitchPosition::Off, Some(true)) => (SwitchPosition::On, SwitchOrder::Arm),
-            (SwitchPosition::Unknown | SwitchPosition::On, Some(true)) => {
-                (self.position, SwitchOrder::Keep)
-            }
-            (SwitchPosition::On, None) => (SwitchPosition::Lost(now), SwitchOrder::Brake),
-            (SwitchPosition::Lost(from), _) if now.since(from) < Self::BRAKING => {
+            (_, Some(false)) => (Off, SwitchOrder::Disarm),
+            (Off, Some(true)) if is_at_rest => (On, SwitchOrder::Arm),
+            (Off, Some(true)) => (Unknown, SwitchOrder::Keep),
+            (Unknown | On, Some(true)) => (self.position, SwitchOrder::Keep),
+            (On, None) => (Lost(now), SwitchOrder::Brake),
+            (Lost(from), _) if now.since(from) < Self::BRAKING => {
                 (self.position, SwitchOrder::Brake)
             }
-            _ => (SwitchPosition::Unknown, SwitchOrder::Disarm),
+            _ => (Unknown, SwitchOrder::Disarm),
         };
         self.position = position;
         order
@@ -387,7 +386,7 @@ impl ArmingSwitch {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SwitchOrder {
-    /// The switch was turned on just now. With a stick that is held, a program does not arm: the robot would leap.
+    /// The switch was turned on just now, and nothing asks for a motion.
     Arm,
     /// The switch is on as before: armed motors stay armed, and others disarmed.
     Keep,
@@ -415,6 +414,24 @@ mod tests {
             (ArmError::Missing(faulty), "DM-J8009 #5; two drives answer with one id: connect one"),
         ] {
             assert!(error.to_string().contains(remedy), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_switch_turned_on_with_a_stick_held_arms_nothing_until_it_is_turned_anew() {
+        let mut switch = ArmingSwitch::new();
+        let (on, off, at_rest) = (Some(true), Some(false), true);
+        let mut orders = [(off, !at_rest), (on, !at_rest), (on, at_rest), (None, at_rest)]
+            .into_iter()
+            .chain([(off, at_rest), (on, at_rest), (on, !at_rest), (None, !at_rest)])
+            .map(|(is_on, is_at_rest)| {
+                switch.read(is_on, is_at_rest, Tick::new(Instant::START, 0.001))
+            });
+        let (disarm, keep) = (SwitchOrder::Disarm, SwitchOrder::Keep);
+        for order in
+            [disarm, keep, keep, disarm, disarm, SwitchOrder::Arm, keep, SwitchOrder::Brake]
+        {
+            assert_eq!(orders.next(), Some(order));
         }
     }
 

@@ -49,8 +49,7 @@ fn robot(
         runner.poll_with(16, |other| pilot.offer(other)); // bounded; foreign frames are yours
         let Some(tick) = runner.due() else { continue }; // 1 kHz on a grid, overruns counted
         let mut twist = pilot.twist();
-        match switch.read(pilot.is_switch_on(), tick) {
-            SwitchOrder::Arm if twist != Twist::ZERO => {} // a stick is held: off and on again
+        match switch.read(pilot.is_switch_on(), twist == Twist::ZERO, tick) {
             SwitchOrder::Arm => runner.arm(tick).unwrap_or_else(|why| pilot.report(why)),
             SwitchOrder::Keep => {}
             SwitchOrder::Brake => twist = Twist::ZERO, // for a second from when the remote control is lost

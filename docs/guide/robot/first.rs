@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let Some(tick) = runner.due() else { continue }; // once a millisecond
 
         let mut rpm = 100.0;
-        match switch.read(Some((100..1_500).contains(&ms)), tick) {
+        match switch.read(Some((100..1_500).contains(&ms)), true, tick) {
             SwitchOrder::Arm => runner.arm(tick)?, // turned on just now
             SwitchOrder::Keep => {}
             SwitchOrder::Brake => rpm = 0.0, // the switch is not heard: disarmed in a second

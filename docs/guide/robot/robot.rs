@@ -64,10 +64,9 @@ impl<P: Port, K: Clock + Copy> Robot<P, K> {
         self.upper.poll(16);
         let mut refusal = None;
         if let Some(tick) = self.lower.due() {
-            let order = self.switch.read(wish.is_on, tick);
+            let order = self.switch.read(wish.is_on, wish.is_at_rest(), tick);
             self.brakes = order == SwitchOrder::Brake;
             match order {
-                SwitchOrder::Arm if !wish.is_at_rest() => {} // the sticks first
                 SwitchOrder::Arm => refusal = self.arm(tick),
                 SwitchOrder::Keep | SwitchOrder::Brake => {}
                 SwitchOrder::Disarm => self.disarm(),

@@ -39,7 +39,7 @@ mod tests {
             world.advance(Duration::from_millis(1));
             runner.poll(16);
             let Some(tick) = runner.due() else { continue };
-            match switch.read(Some(ms >= 100), tick) {
+            match switch.read(Some(ms >= 100), true, tick) {
                 SwitchOrder::Arm => runner.arm(tick).unwrap(),
                 SwitchOrder::Keep | SwitchOrder::Brake => {}
                 SwitchOrder::Disarm => runner.device_mut().disarm(),

@@ -91,19 +91,15 @@ impl Robot {
     /// Takes what the remote control shows: once a tick, before [`drive`](Self::drive). Arms only with both sticks at rest. When the remote
     /// control is lost, the robot brakes for a second, and is disarmed.
     pub fn hear(&mut self, remote: &Remote, tick: Tick) -> SwitchOrder {
-        let is_at_rest = remote.right_switch.is_at(Switch::Down);
-        let order = self.switch.read(is_at_rest.map(|is_at_rest| !is_at_rest), tick);
-        let sticks_rest = [remote.right_x, remote.right_y, remote.left_x] == [0.0; 3];
+        let is_on = remote.right_switch.is_at(Switch::Down).map(|is_down| !is_down);
+        let is_at_rest = [remote.right_x, remote.right_y, remote.left_x] == [0.0; 3];
+        let order = self.switch.read(is_on, is_at_rest, tick);
         let brakes = order == SwitchOrder::Brake;
         self.mode = if brakes { Mode::Rest } else { remote.right_switch.into() };
-        match order {
-            SwitchOrder::Arm if !sticks_rest => SwitchOrder::Keep,
-            SwitchOrder::Arm => {
-                self.chassis.restart();
-                order
-            }
-            _ => order,
+        if order == SwitchOrder::Arm {
+            self.chassis.restart();
         }
+        order
     }
 
     /// Sets the targets of the wheels: zero unless both are armed, so when one is lost for 100 ms, the other brakes.

@@ -235,7 +235,7 @@ impl<K: Kinematics<Speed = AngularVelocity>> Robot for OnWheels<K> {
 
     fn cycle(&mut self, tick: Tick, pilot: Pilot) -> Result<(), ArmError> {
         let mut armed = Ok(());
-        match self.switch.read(Some(pilot.is_switch_on), tick) {
+        match self.switch.read(Some(pilot.is_switch_on), pilot.twist == Twist::ZERO, tick) {
             SwitchOrder::Arm => armed = self.runner.arm(tick),
             SwitchOrder::Keep | SwitchOrder::Brake => {}
             SwitchOrder::Disarm => self.runner.device_mut().disarm(),

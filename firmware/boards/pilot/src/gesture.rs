@@ -9,12 +9,11 @@ use drivetrain::wire::dbus::{Remote, Switch};
 pub struct Gesture(ArmingSwitch);
 
 impl Gesture {
-    /// Returns what the switch asks for; to be called once a tick. A turn to the top while a stick is held arms nothing.
-    pub fn read(&mut self, remote: &Remote, tick: Tick) -> SwitchOrder {
-        match self.0.read(remote.right_switch.is_at(Switch::Up), tick) {
-            SwitchOrder::Arm if !asks_for_nothing(remote) => SwitchOrder::Keep,
-            order => order,
-        }
+    /// Returns what the switch asks for; to be called once a tick. A turn to the top arms nothing while a stick is held, or anything else
+    /// asks for a motion.
+    pub fn read(&mut self, remote: &Remote, is_at_rest: bool, tick: Tick) -> SwitchOrder {
+        let is_at_rest = is_at_rest && asks_for_nothing(remote);
+        self.0.read(remote.right_switch.is_at(Switch::Up), is_at_rest, tick)
     }
 }
 

@@ -159,16 +159,13 @@ impl Pilot {
     /// Returns what the remote control asks for; to be called once a tick.
     pub fn order(&mut self, tick: Tick) -> SwitchOrder {
         let now = tick.now();
-        let order = self.gesture.read(&self.dbus.remote(now), tick);
-        self.brakes = order == SwitchOrder::Brake;
-        if order != SwitchOrder::Arm {
-            return order;
-        }
         // A turn of the PC is a stick that is held: arming moves nothing.
-        if self.turn_of_pc(now) != 0.0 {
-            return SwitchOrder::Keep;
+        let is_at_rest = self.turn_of_pc(now) == 0.0;
+        let order = self.gesture.read(&self.dbus.remote(now), is_at_rest, tick);
+        self.brakes = order == SwitchOrder::Brake;
+        if order == SwitchOrder::Arm {
+            self.chassis.restart();
         }
-        self.chassis.restart();
         order
     }
 

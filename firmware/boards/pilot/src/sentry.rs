@@ -219,7 +219,7 @@ impl Sentry {
 
     /// Returns what the remote control asks for; to be called once a tick.
     pub fn order(&mut self, remote: &Remote, tick: Tick) -> SwitchOrder {
-        let order = self.gesture.read(remote, tick);
+        let order = self.gesture.read(remote, true, tick);
         if order == SwitchOrder::Arm {
             self.chassis.restart();
         }
