@@ -342,3 +342,74 @@ fn two_drives_are_found_while_each_third_answer_is_lost() {
         }
     }
 }
+
+/// The motor is armed and has no target: it rests, and the program may wait for an hour.
+#[test]
+fn a_second_drive_that_comes_while_armed_without_a_target_trips() {
+    for hz in [100, 250, 500, 1_000] {
+        armed_and_idle(damiao(hz), &format!("damiao at {hz} Hz"));
+        let motor = robstride::Motor::new(robstride::Model::RS02, 1, mit()).unwrap();
+        let drive = || RobStrideDrive::of(robstride::Model::RS02, 1);
+        armed_and_idle(Bench::new(motor, hz, drive), &format!("robstride at {hz} Hz"));
+        let motor = rmd::Motor::new(rmd::Model::X8_120, 1, mit()).unwrap();
+        armed_and_idle(Bench::new(motor, hz, || RmdDrive::new(1, 2.4)), &format!("rmd at {hz} Hz"));
+    }
+}
+
+fn armed_and_idle<M: DriveProtocol>(mut bench: Bench<M>, what: &str) {
+    let idle = |bench: &mut Bench<M>, ms: u64| {
+        (0..ms * 1_000 / bench.period_us).for_each(|_| bench.tick())
+    };
+    bench.run(2_500);
+    bench.own.arm(bench.now()).unwrap();
+    idle(&mut bench, 3_000);
+    assert!(bench.own.is_armed(), "{what}: one drive");
+    bench.run(500);
+    assert!(bench.own.guard().has_target(), "{what}: driven");
+    idle(&mut bench, 3_000);
+    assert!(bench.own.is_armed() && !bench.is_double(), "{what}: one drive that was driven");
+    bench.shown = 2;
+    idle(&mut bench, 3_000);
+    assert!(!bench.own.is_armed() && bench.is_double(), "{what}: two drives");
+}
+
+/// A tool commands each 200 ms, and both drives answer it.
+#[test]
+fn a_second_drive_that_comes_beside_a_tool_is_not_armed_after_the_tool() {
+    for hz in [50, 100, 125, 250, 1_000] {
+        let mut bench = damiao(hz);
+        bench.run(5_000);
+        for turn in 0..100 {
+            bench.shown = if turn < 5 { 1 } else { 2 };
+            let rival = CanFrame::standard(1, [0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFD]);
+            bench.rival = rival;
+            bench.tick();
+            bench.rival = None;
+            bench.run(200);
+        }
+        for _ in 0..6 * hz {
+            bench.tick();
+            assert!(bench.own.arm(bench.now()).is_err(), "{hz} Hz");
+        }
+        assert!(bench.is_double(), "{hz} Hz");
+    }
+}
+
+/// A second master is known to the program, and there is none.
+#[test]
+fn two_drives_are_found_where_a_second_master_is_ignored() {
+    static TOLERANT: HealthConfig =
+        HealthConfig::new().with_reaction(Condition::SecondMaster, Reaction::Ignore);
+    for (hz, shown) in [(100, 1), (100, 2), (1_000, 1), (1_000, 2)] {
+        let mut bench = damiao(hz);
+        bench.own = bench.own.with_health(&TOLERANT).unwrap();
+        bench.shown = shown;
+        let mut ticks = 0;
+        while ticks < 5 * hz && bench.own.arm(bench.now()).is_err() {
+            bench.tick();
+            ticks += 1;
+        }
+        assert_eq!(bench.own.is_armed(), shown == 1, "{hz} Hz, {shown} drives, {ticks} updates");
+        assert_eq!(bench.is_double(), shown == 2, "{hz} Hz, {shown} drives");
+    }
+}

@@ -178,3 +178,35 @@ fn two_runs_of_one_seed_are_the_same_to_the_last_bit() {
 fn world_moved(truth: [(i64, u32); 2]) -> bool {
     truth.iter().all(|(counts, _)| counts.abs() > 8192)
 }
+
+/// Four motors send 40 frames in each period of 10 ms.
+#[test]
+fn a_budget_below_the_frames_of_a_period_arms_nothing() {
+    for (budget, is_armed) in [(16, false), (39, false), (41, true), (64, true)] {
+        let world = Simulation::new(12).with_receive_depth(Line::Can1, 64);
+        let keys = [1, 2, 3, 4].map(|id| world.attach(MotorConfig::m3508(id)).unwrap());
+        let mut bus: Bus = Bus::new();
+        let wheels = bus
+            .attach_all([1, 2, 3, 4].map(|id| Config::<M3508>::new(id).speed_loop(SPEED)))
+            .unwrap();
+        let mut robot = Runner::new(Nb(world.controller()), world.clock(), bus)
+            .with_period(Duration::from_millis(10));
+        for ms in (0..2_000).step_by(10) {
+            world.advance(Duration::from_millis(10));
+            robot.poll(budget);
+            let Some(tick) = robot.due() else { continue };
+            if ms == 1_000 {
+                let refused = robot.arm(tick).err().map(|why| why.to_string());
+                let waits =
+                    refused.as_ref().is_some_and(|why| why.contains("received frames wait"));
+                assert_eq!((refused.is_none(), waits), (is_armed, !is_armed), "{refused:?}");
+            }
+            for wheel in wheels {
+                _ = robot.device_mut().set_velocity(wheel, rpm(100.0));
+            }
+            robot.tick(tick);
+        }
+        let turns = world.motor(keys[0]).unwrap().velocity / rpm(100.0);
+        assert!((turns - f32::from(u8::from(is_armed))).abs() < 0.05, "{budget}: {turns}");
+    }
+}

@@ -69,6 +69,7 @@ mod homing;
 mod link;
 mod load;
 mod safety;
+mod switch;
 mod watch;
 
 pub use actuator::{Actuator, DriveProtocol, Impedance, ImpedanceControl, Order, Target};
@@ -78,7 +79,7 @@ pub(crate) use actuator::{
     register_questions, registers,
 };
 pub(crate) use arming::Obstacles;
-pub use arming::{ArmError, ArmingSwitch, Missing, SwitchOrder, WrongSetting};
+pub use arming::{ArmError, Missing, WrongSetting};
 pub use capability::{Capabilities, Capability};
 pub(crate) use claim::Route;
 pub use claim::{Claim, MotorName};
@@ -98,5 +99,6 @@ pub(crate) use link::{age, is_near, take_age};
 pub use load::BusLoad;
 pub use safety::OPENING;
 pub(crate) use safety::{DeviceGuard, Guarded, Hold, MotorGuard, Repeat, Rest};
+pub use switch::{ArmingSwitch, SwitchOrder};
 pub use watch::Vitals;
 pub(crate) use watch::Watch;

@@ -85,9 +85,9 @@ impl Watch {
     /// Tells whether a drive that answers each frame is known to be the only one with its id, or need not be.
     pub(crate) fn is_single(&self) -> bool {
         let forbids = self.config.forbids(Conditions::NONE.with(Condition::DuplicateId));
-        // A second master that is ignored is answered too.
-        let need_not = !forbids || self.config.ignores(Condition::SecondMaster);
-        need_not || self.answers.are_of_one()
+        // Beside a second master that is ignored, no answer is of one frame.
+        let has_rival = self.answers.has_rival() && self.config.ignores(Condition::SecondMaster);
+        !forbids || has_rival || self.answers.are_of_one()
     }
 
     /// Returns the gap from which feedback lengthens the longest gap of the present window.
@@ -107,7 +107,7 @@ impl Watch {
 
     /// Notes a command of another node, which relaxes the motor where a second master demands rest. The drive answers that node too.
     pub(crate) fn hear_rival(&mut self, guard: &mut Guard, now: Instant) {
-        self.answers.begin();
+        self.answers = Answers::BESIDE_RIVAL;
         let before = guard.conditions();
         if !self.config.ignores(Condition::SecondMaster) {
             guard.note(Condition::SecondMaster, true, now);
@@ -124,7 +124,7 @@ impl Watch {
     pub(crate) fn start(&mut self, guard: &mut Guard, motor: MotorName, now: Instant) {
         self.part = motor.id();
         self.next = self.after(now);
-        // Nobody counts the answers of a drive that is driven.
+        // Another drive may come while nobody counts.
         self.forget_drive();
         guard.latch(now, |latch| self.monitor.start(latch));
     }
@@ -156,8 +156,8 @@ impl Watch {
             guard.trust(0);
         }
         let is_online = guard.link() == Link::Online;
-        // A frame that nobody answers tells nothing of a second drive.
-        if guard.is_armed() || !is_online {
+        // A frame that nobody answers tells nothing of a second drive, and nobody counts the commands.
+        if guard.has_target() || !is_online {
             self.answers.begin();
         } else if self.answers.are_enough() {
             self.compare_answers(guard, now);

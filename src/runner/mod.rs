@@ -99,7 +99,12 @@ pub struct Runner<P, K, D> {
     watch: Watch,
     meter: Meter,
     pending: Pending,
+    /// The driver had no received frame then, or the first poll had one.
+    drained: Instant,
 }
+
+/// A program that polls once a period needs two of them to take a frame.
+const LONGEST_WAIT_PERIODS: u64 = 3;
 
 impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// Takes driver, clock and device; ticks at 1 kHz.
@@ -117,6 +122,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
             watch: Watch::new(),
             meter: Meter::new(),
             pending: Pending::NONE,
+            drained: Instant::from_micros(u64::MAX),
         }
     }
 
@@ -132,17 +138,24 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     ///
     /// Never waits, continues after errors, and ends: an error counts against the budget as well. The clock is read for
     /// each 16 frames: a frame has the time of the first of its 16.
+    ///
+    /// Take more than come between two polls: frames that wait are old. Where no poll of the last three periods left the driver empty, as
+    /// after a pause of the program, a frame has the time three periods after the last that did. So the motors are late, and after a pause
+    /// of more than 100 ms relaxed. Each poll then takes one frame beyond its budget.
     pub fn poll_with(&mut self, budget: usize, mut unrelated: impl FnMut(&CanFrame)) -> usize {
         self.watch.receive_ran();
         let (mut frame, mut now) = (CanFrame::EMPTY, Instant::START);
         let mut tally = Tally::default();
         // Frames of other kinds do not count towards the frames of a reading.
         let (mut frames, mut foreign) = (0, 0);
-        for _ in 0..budget {
+        let mut left = budget;
+        while left > 0 {
+            left -= 1;
             match self.port.try_receive(&mut frame) {
                 Received::Frame => {
                     if frames % FRAMES_A_READING == 0 {
-                        now = self.read_clock();
+                        now = self.time_of_arrival();
+                        left += usize::from(frames == 0 && now < self.watch.reading());
                     }
                     frames += 1;
                     if self.take(&frame, now, &mut tally) == Ingest::Unrelated {
@@ -153,7 +166,10 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
                     foreign += 1;
                     increment(&mut self.statistics.unrelated);
                 }
-                Received::Empty => break,
+                Received::Empty => {
+                    self.drained = self.watch.reading();
+                    break;
+                }
                 Received::Failed(kind) => self.note_failure(kind),
             }
         }
@@ -267,6 +283,20 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         let now = self.clock.now();
         self.watch.read(now);
         now
+    }
+
+    /// Reads the clock, and returns the time of a frame that the driver hands out now.
+    #[inline(never)]
+    fn time_of_arrival(&mut self) -> Instant {
+        let reading = self.read_clock();
+        self.drained = self.drained.min(reading);
+        reading.min(self.last_arrival())
+    }
+
+    /// Returns the last time that a frame of the driver may have.
+    fn last_arrival(&self) -> Instant {
+        let longest_us = LONGEST_WAIT_PERIODS * self.ticker.period().as_micros();
+        self.drained + Duration::from_micros(longest_us)
     }
 
     #[cold]

@@ -82,6 +82,11 @@ impl Watch {
         self.reading = now;
     }
 
+    /// Returns the last reading of the clock.
+    pub(super) const fn reading(&self) -> Instant {
+        self.reading
+    }
+
     /// Returns the time of the last step that was run.
     pub(super) const fn ticked(&self) -> Option<Instant> {
         self.ticked

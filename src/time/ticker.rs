@@ -181,9 +181,10 @@ impl TimeStep {
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::time::TimeStep;
+    /// use drivetrain::time::{Instant, Tick, TimeStep};
     ///
-    /// assert_eq!(TimeStep::of(0.001), TimeStep::new(0.001, 0.1));
+    /// let tick = Tick::new(Instant::from_micros(5_000), 0.001); // of `Runner::due`, in a program
+    /// assert_eq!(TimeStep::of(tick.dt_s()), TimeStep::new(0.001, 0.1));
     /// ```
     #[must_use]
     #[inline]

@@ -1,4 +1,4 @@
-//! F01 to F12: what is received.
+//! F01 to F12, F92: what is received.
 
 use crate::case::{Case, cases, safe_after, saw};
 use crate::rig::{Rig, armed, at_ms, feedback, rpm, step, ticks_since};
@@ -24,6 +24,8 @@ pub(crate) const CASES: &[Case] = cases![
     f10_reordered_frames_are_one_sample_off_and_converge,
     f11_64_frames_after_a_stall_are_all_taken_and_the_last_one_wins,
     f12_a_full_queue_and_an_overrun_are_counted_and_freshness_does_the_rest,
+    f92_frames_that_waited_in_a_pause_drive_nothing,
+    f92_a_pause_of_more_than_100_ms_relaxes_whatever_waits,
 ];
 
 #[cfg_attr(test, test)]
@@ -246,4 +248,58 @@ fn f12_a_full_queue_and_an_overrun_are_counted_and_freshness_does_the_rest() {
     assert!((0..4).all(|wheel| rig.link(wheel) == Link::Online));
     assert!(rig.words(0, 140, 160).iter().all(|word| *word > 0));
     saw("13 dropped by the queue, 1 overrun of the controller, counted");
+}
+
+/// Steps of 1 ms with a poll of 16 frames, until a poll finds the driver empty; returns how many, all at rest.
+fn rests_while_frames_wait(rig: &mut Rig<'_>) -> u64 {
+    let mut steps = 0;
+    while rig.runner.poll(16) >= 16 {
+        let tick = rig.runner.due().unwrap();
+        for wheel in &rig.wheels {
+            _ = rig.runner.device_mut().set_velocity(*wheel, rpm(200.0));
+        }
+        rig.runner.tick(tick);
+        rig.world.advance(Duration::from_millis(1));
+        let commands = rig.keys.iter().map(|key| rig.world.motor(*key).unwrap().command);
+        assert!(commands.into_iter().all(|command| command == 0));
+        steps += 1;
+    }
+    steps
+}
+
+#[cfg_attr(test, test)]
+fn f92_frames_that_waited_in_a_pause_drive_nothing() {
+    for pause_ms in [20, 40, 80] {
+        let world = Simulation::new(12).with_receive_depth(Line::Can1, 64);
+        let mut rig = Rig::new(&world, Line::Can1, 2);
+        rig.drive(500);
+        world.advance(Duration::from_millis(pause_ms));
+        assert!(rests_while_frames_wait(&mut rig) > 0, "{pause_ms} ms");
+        assert!(rig.runner.is_armed(), "{pause_ms} ms");
+        rig.drive(500);
+        let velocity = world.motor(rig.keys[0]).unwrap().velocity;
+        assert!((velocity / rpm(200.0) - 1.0).abs() < 0.02, "{pause_ms} ms: {velocity:?}");
+    }
+    safe_after(1);
+    saw("20 to 80 ms, 64 frames wait: rest in the first tick, until none waits");
+}
+
+#[cfg_attr(test, test)]
+fn f92_a_pause_of_more_than_100_ms_relaxes_whatever_waits() {
+    for (pause_ms, depth) in [(110, 3), (110, 64), (500, 3), (500, 64), (3_000, 64)] {
+        let world = Simulation::new(13).with_receive_depth(Line::Can1, depth);
+        let mut rig = Rig::new(&world, Line::Can1, 2);
+        rig.drive(500);
+        assert!(rig.runner.is_armed());
+        world.advance(Duration::from_millis(pause_ms));
+        for _ in 0..300 {
+            rig.poll_and_tick(|_, _| {});
+            world.advance(Duration::from_millis(1));
+            let command = world.motor(rig.keys[0]).unwrap().command;
+            let rests = !rig.runner.is_armed() && command == 0;
+            assert!(rests, "{pause_ms} ms, {depth} frames");
+        }
+    }
+    safe_after(1);
+    saw("110 ms to 3 s: relaxed with the first tick, latched");
 }

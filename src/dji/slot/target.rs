@@ -103,6 +103,7 @@ impl Slot {
         needs(self.has_position_loop())?;
         self.admit(angle.is_finite())?;
         if !self.homing.is_known() {
+            self.relax();
             return Err(TargetError::NotHomed);
         }
         let (_, phase) = self.shaft.locate(angle);

@@ -131,10 +131,17 @@ fn an_angle_goes_the_shortest_way() {
 fn an_absolute_angle_of_a_geared_motor_needs_a_zero() {
     let config = Config::<M3508>::at_once(1).position_loop(PidConfig::new(1.0, 0.0, 0.0), SPEED);
     let (mut bus, [joint]) = armed([config]);
+    bus.set_velocity(joint, AngularVelocity::from_rad_per_s(5.0)).unwrap();
+    step(&mut bus, 1);
+    assert_ne!(sent(&mut bus), [(0x200, [0; 4])]);
     assert_eq!(bus.set_angle(joint, Angle::ZERO), Err(TargetError::NotHomed));
-    assert_eq!(bus.set_position(joint, Position::from_turns(2)), Ok(()));
-    bus.zero(joint).unwrap();
     step(&mut bus, 2);
+    assert_eq!(sent(&mut bus), [(0x200, [0; 4])], "the velocity before it is gone too");
+    assert_eq!(bus.set_position(joint, Position::from_turns(2)), Ok(()));
+    step(&mut bus, 3);
+    assert_ne!(sent(&mut bus), [(0x200, [0; 4])]);
+    bus.zero(joint).unwrap();
+    step(&mut bus, 4);
     assert_eq!(sent(&mut bus), [(0x200, [0; 4])], "the old target is gone");
     assert_eq!(bus.set_angle(joint, Angle::ZERO), Ok(()));
 }

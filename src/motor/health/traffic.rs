@@ -134,13 +134,18 @@ pub(crate) struct Answers {
     asked: u16,
     answered: u16,
     are_of_one: bool,
+    /// Another node commanded the drive since the last comparison, and was answered too.
+    has_rival: bool,
 }
 
 impl Answers {
     /// So many frames are compared with the feedback: more than a quarter beyond one answer each comes from two drives.
     const ENOUGH: u16 = 64;
 
-    pub(crate) const NONE: Self = Self { asked: 0, answered: 0, are_of_one: false };
+    pub(crate) const NONE: Self =
+        Self { asked: 0, answered: 0, are_of_one: false, has_rival: false };
+
+    pub(crate) const BESIDE_RIVAL: Self = Self { has_rival: true, ..Self::NONE };
 
     /// Counts from zero, and keeps the last comparison.
     pub(crate) const fn begin(&mut self) {
@@ -162,13 +167,17 @@ impl Answers {
 
     /// Compares both numbers, and begins anew.
     pub(crate) fn compare(&mut self) {
-        self.are_of_one = 4 * u32::from(self.answered) <= 5 * u32::from(self.asked);
-        self.begin();
+        let are_of_one = 4 * u32::from(self.answered) <= 5 * u32::from(self.asked);
+        *self = Self { are_of_one, ..Self::NONE };
     }
 
     /// Tells whether the last comparison found one drive.
     pub(crate) const fn are_of_one(&self) -> bool {
         self.are_of_one
+    }
+
+    pub(crate) const fn has_rival(&self) -> bool {
+        self.has_rival
     }
 }
 
