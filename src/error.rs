@@ -141,6 +141,14 @@ impl ConfigError {
         }
     }
 
+    /// Refuses what is not supported.
+    pub(crate) const fn check_support(
+        is_supported: bool,
+        parameter: &'static str,
+    ) -> Result<(), Self> {
+        if is_supported { Ok(()) } else { Err(Self::Unsupported(parameter)) }
+    }
+
     /// Accepts a limit above 0 and at most `most`.
     pub(crate) const fn check_limit(
         parameter: &'static str,

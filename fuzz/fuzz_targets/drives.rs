@@ -212,7 +212,7 @@ fn robstride_of(kind: u8, input: &mut Input) {
             match kind % 4 {
                 0 => motor.read(register),
                 1 | 2 => _ = motor.write(register, value),
-                _ if kind & 4 == 0 => motor.set_zero(),
+                _ if kind & 4 == 0 => _ = motor.set_zero(),
                 _ => _ = motor.store(),
             }
         })(input);

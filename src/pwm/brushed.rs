@@ -94,9 +94,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
         let speed = config.make_loop()?;
         let guard =
             if config.counts_per_turn.is_some() { Guard::new() } else { Guard::without_feedback() };
-        if config.health.soft_limits.is_some() {
-            return Err(ConfigError::Unsupported("soft limits"));
-        }
+        ConfigError::check_support(config.health.soft_limits.is_none(), "soft limits")?;
         let watch = Watch::new().with_config(config.health).map_err(ConfigError::Unusable)?;
         Ok(Self {
             channel,

@@ -5,7 +5,7 @@ use super::config::Mode;
 use super::{Feedback, Model, Register, Status};
 use crate::control::PidConfig;
 use crate::encoder::Laps;
-use crate::error::{ConfigError, check};
+use crate::error::ConfigError;
 use crate::frame::{CanFrame, extended_id};
 use crate::motor::{
     Capabilities, Capability, Claim, DriveProtocol, Ingest, Inquiry, MotorName, Order, Preparation,
@@ -110,9 +110,7 @@ impl Motor {
     /// # Errors
     /// [`ConfigError::Range`] for another time, [`ConfigError::Unsupported`] for a CyberGear, a drive without a time-out.
     pub fn with_timeout(self, timeout: Duration) -> Result<Self, ConfigError> {
-        if !self.model.has_timeout() {
-            return Err(ConfigError::Unsupported("time-out"));
-        }
+        ConfigError::check_support(self.model.has_timeout(), "time-out")?;
         Ok(Self { timeout: TimeoutUnits::new(timeout, 5_000_000)?, ..self })
     }
 
@@ -135,33 +133,39 @@ impl Motor {
     /// # Errors
     /// [`ConfigError::Unsupported`] for a CyberGear, whose bit rate the frame would change.
     pub fn store(&mut self) -> Result<(), ConfigError> {
-        if !self.model.can_store() {
-            return Err(ConfigError::Unsupported("frame to store parameters"));
-        }
+        ConfigError::check_support(self.model.can_store(), "frame to store parameters")?;
         self.settings.request(Inquiry::Store);
         Ok(())
     }
 
-    /// Makes the present position zero; while the motor has no target. A disarmed motor is not armed before the frame went out. The frame is
-    /// sent again if no driver took it, so keep the shaft at its zero until the motor can be armed. A driven motor forgets the request: the
-    /// shaft would be elsewhere when the motor is disarmed. A RobStride keeps the zero over a loss of the supply if [stored](Self::store), a
-    /// CyberGear does not.
-    pub const fn set_zero(&mut self) {
-        self.once = Some(Command::SetZero);
-        self.settings.forget();
-    }
-
-    /// Gives the drive another id, 1 to 127, at once; while the motor has no target. The frame goes out once, and a driven motor forgets the
-    /// request. This motor then hears no more of the drive: make another motor.
+    /// Makes the present position zero, before the drive is enabled: a disarmed motor is not armed before the frame went out. The frame is
+    /// sent again if no driver took it, so keep the shaft at its zero until the motor can be armed. A RobStride keeps the zero over a loss of
+    /// the supply if [stored](Self::store), a CyberGear does not.
     ///
     /// # Errors
-    /// [`ConfigError::Range`] for another id, [`ConfigError::Conflict`] for the id of the host.
-    pub const fn set_id(&mut self, id: u8) -> Result<(), ConfigError> {
-        check!(ConfigError::check_range("id", id as f32, 1.0, 127.0));
+    /// [`ConfigError::Unsupported`] while the drive reports that it runs: the shaft would jump.
+    pub fn set_zero(&mut self) -> Result<(), ConfigError> {
+        self.request(Command::SetZero)
+    }
+
+    /// Gives the drive another id, 1 to 127, before the drive is enabled. The frame goes out once. This motor then hears no more of the
+    /// drive: make another motor.
+    ///
+    /// # Errors
+    /// [`ConfigError::Range`] for another id, [`ConfigError::Conflict`] for the id of the host, [`ConfigError::Unsupported`] as for
+    /// [`set_zero`](Self::set_zero).
+    pub fn set_id(&mut self, id: u8) -> Result<(), ConfigError> {
+        ConfigError::check_range("id", id.into(), 1.0, 127.0)?;
         if id == self.host {
             return Err(ConfigError::Conflict("id"));
         }
-        self.once = Some(Command::SetId(id));
+        self.request(Command::SetId(id))
+    }
+
+    fn request(&mut self, command: Command) -> Result<(), ConfigError> {
+        let is_running = self.is_enabled() == Some(true);
+        ConfigError::check_support(!is_running, "zero or id of a running drive")?;
+        self.once = Some(command);
         self.settings.forget();
         Ok(())
     }
@@ -269,7 +273,8 @@ impl DriveProtocol for Motor {
             self.mode.reset();
             self.settings.forget();
         }
-        Some(self.frame_of(asked.map_or(Command::Enable, Command::of)))
+        let command = self.once.take().unwrap_or(asked.map_or(Command::Enable, Command::of));
+        Some(self.frame_of(command))
     }
 
     fn disable(&mut self) -> Option<CanFrame> {
@@ -283,7 +288,7 @@ impl DriveProtocol for Motor {
 
     fn unsent(&mut self, frame: &CanFrame) {
         if self.once.is_none() && *frame == self.frame_of(Command::SetZero) {
-            self.set_zero();
+            _ = self.request(Command::SetZero);
         }
     }
 

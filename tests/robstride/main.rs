@@ -390,7 +390,7 @@ fn a_cybergear_is_never_told_to_store() {
 
 /// The joint may be driven elsewhere before the motor is disarmed: the zero would be there.
 #[test]
-fn a_driven_motor_forgets_a_zero_and_an_id_and_a_disarmed_one_sets_them() {
+fn a_running_drive_refuses_a_zero_and_an_id_and_a_disarmed_one_takes_them() {
     let mut bench = Bench::armed(operation());
     bench.drive.shaft_mut().set_angle(2.0);
     bench.steps(300, |bench| _ = bench.own.set_torque(0.0));
@@ -402,14 +402,15 @@ fn a_driven_motor_forgets_a_zero_and_an_id_and_a_disarmed_one_sets_them() {
     let disarmed = |bench: &mut Bench| {
         assert!(bench.frames.iter().all(|frame| ![6, 7].contains(&kind(frame))));
     };
-    bench.own.motor_mut().set_zero();
+    let refused = bench.own.motor_mut().set_zero().unwrap_err().to_string();
+    assert!(refused.starts_with("zero or id of a running drive"), "{refused}");
     bench.steps(100, driven);
-    bench.own.motor_mut().set_id(0x55).unwrap();
+    assert!(bench.own.motor_mut().set_id(0x55).is_err());
     bench.steps(100, driven);
     bench.own.disarm();
     bench.steps(100, disarmed);
     assert!((bench.drive.shaft().angle_rad() - here).abs() < 0.5);
-    bench.own.motor_mut().set_zero();
+    bench.own.motor_mut().set_zero().unwrap();
     bench.steps(100, |_| {});
     assert!(bench.drive.shaft().angle_rad().abs() < 0.5, "{}", bench.drive.shaft().angle_rad());
     assert!(bench.own.motor_mut().set_id(0).is_err() && bench.own.motor_mut().set_id(128).is_err());
@@ -525,7 +526,7 @@ fn asked_for_a_zero() -> Bench {
     let mut bench = Bench::new(operation());
     bench.drive.shaft_mut().set_angle(2.0);
     bench.steps(300, |_| {});
-    bench.own.motor_mut().set_zero();
+    bench.own.motor_mut().set_zero().unwrap();
     bench
 }
 
@@ -544,6 +545,27 @@ fn a_zero_that_was_not_sent_yet_holds_up_arming() {
     bench.own.arm(bench.now()).unwrap();
     bench.steps(100, |bench| bench.own.set_torque(0.0).unwrap());
     assert_at_zero(&bench);
+}
+
+/// The program arms, sets the zero and gives a target in one tick, or one after the other.
+#[test]
+fn a_zero_that_is_asked_for_once_armed_is_set_before_the_drive_is_enabled() {
+    for (rest_ms, pause_ms) in [(0, 0), (0, 3), (200, 0), (200, 3), (200, 50)] {
+        let mut bench = Bench::new(operation());
+        bench.drive.shaft_mut().set_angle(2.0);
+        bench.steps(300, |_| {});
+        bench.own.arm(bench.now()).unwrap();
+        bench.steps(rest_ms, |_| {});
+        bench.own.motor_mut().set_zero().unwrap();
+        bench.steps(pause_ms, |_| {});
+        let target = Impedance { stiffness: 20.0, damping: 1.0, ..Impedance::FREE };
+        bench.steps(1_000, |bench| {
+            _ = bench.own.set_impedance(target);
+            let angle_rad = bench.drive.shaft().angle_rad();
+            assert!(angle_rad.abs() < 0.1 || angle_rad > 1.9, "{rest_ms}, {pause_ms}: {angle_rad}");
+        });
+        assert_at_zero(&bench);
+    }
 }
 
 /// The driver refuses the frame with the zero, and takes all others.

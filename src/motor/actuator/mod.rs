@@ -179,9 +179,7 @@ impl<M: DriveProtocol> Actuator<M> {
     /// [`ConfigError::NotFinite`]; [`ConfigError::Unsupported`] for a drive without [`Capability::AbsoluteAngle`].
     pub fn with_zero(mut self, angle: Angle) -> Result<Self, ConfigError> {
         finite("zero", angle.as_radians())?;
-        if !self.is_absolute() {
-            return Err(ConfigError::Unsupported("zero"));
-        }
+        ConfigError::check_support(self.is_absolute(), "zero")?;
         self.joint.zero = Zero::Given(angle);
         self.is_steady = false;
         Ok(self)
