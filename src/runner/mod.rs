@@ -137,11 +137,11 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// number of frames.
     ///
     /// Never waits, continues after errors, and ends: an error counts against the budget as well. The clock is read for
-    /// each 16 frames: a frame has the time of the first of its 16.
+    /// each 16 frames: the 16 have one time.
     ///
-    /// Take more than come between two polls: frames that wait are old. Where no poll of the last three periods left the driver empty, as
-    /// after a pause of the program, a frame has the time three periods after the last that did. So the motors are late, and after a pause
-    /// of more than 100 ms relaxed. Each poll then takes one frame beyond its budget.
+    /// A budget above the frames between two polls leaves the driver empty. If no poll of the last three periods did so, as after a pause of
+    /// the program, frames have waited, and the motors count as unheard since the last poll that did: late, relaxed after 100 ms. A poll
+    /// then takes one frame beyond its budget.
     pub fn poll_with(&mut self, budget: usize, mut unrelated: impl FnMut(&CanFrame)) -> usize {
         self.watch.receive_ran();
         let (mut frame, mut now) = (CanFrame::EMPTY, Instant::START);
