@@ -137,11 +137,11 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// number of frames.
     ///
     /// Never waits, continues after errors, and ends: an error counts against the budget as well. The clock is read for
-    /// each 16 frames: the 16 have one time.
+    /// each 16 frames, which have the same time.
     ///
-    /// A budget above the frames between two polls leaves the driver empty. If no poll of the last three periods did so, as after a pause of
-    /// the program, frames have waited, and the motors count as unheard since the last poll that did: late, relaxed after 100 ms. A poll
-    /// then takes one frame beyond its budget.
+    /// A budget above the number of frames between two polls leaves the driver empty. Frames wait after a pause of the program, or a budget too
+    /// small for three periods: the motors then count as unheard since the driver was last empty, are late, and relaxed after 100 ms. A poll
+    /// takes a frame beyond the budget meanwhile.
     pub fn poll_with(&mut self, budget: usize, mut unrelated: impl FnMut(&CanFrame)) -> usize {
         self.watch.receive_ran();
         let (mut frame, mut now) = (CanFrame::EMPTY, Instant::START);
@@ -285,7 +285,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         now
     }
 
-    /// Reads the clock, and returns the time of a frame that the driver hands out now.
+    /// Reads the clock, and returns the time of a frame handed out now.
     #[inline(never)]
     fn time_of_arrival(&mut self) -> Instant {
         let reading = self.read_clock();
@@ -293,7 +293,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         reading.min(self.last_arrival())
     }
 
-    /// Returns the last time that a frame of the driver may have.
+    /// Returns the latest time for a frame of the driver.
     fn last_arrival(&self) -> Instant {
         let longest_us = LONGEST_WAIT_PERIODS * self.ticker.period().as_micros();
         self.drained + Duration::from_micros(longest_us)
