@@ -42,10 +42,10 @@ use crate::frame::CanFrame;
 use crate::motor::{Devices, Ingest};
 use crate::time::{Clock, Duration, Instant, Tick, Ticker};
 use embedded_can::ErrorKind;
-use port::{Received, Sending};
+use port::{Pending, Received, Sending};
 use statistics::{Meter, Tally, increment};
 use stop::WatchedStop;
-use watch::{Pending, Watch, together};
+use watch::{Watch, together};
 
 /// Number of frames for one reading of the clock: frames in the driver arrived before the reading, and frames arriving
 /// meanwhile look older by the processing time of the others.
@@ -99,12 +99,7 @@ pub struct Runner<P, K, D> {
     watch: Watch,
     meter: Meter,
     pending: Pending,
-    /// The driver had no received frame then, or the first poll had one.
-    drained: Instant,
 }
-
-/// A program that polls once a period needs two of them to take a frame.
-const LONGEST_WAIT_PERIODS: u64 = 3;
 
 impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// Takes driver, clock and device; ticks at 1 kHz.
@@ -122,7 +117,6 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
             watch: Watch::new(),
             meter: Meter::new(),
             pending: Pending::NONE,
-            drained: Instant::from_micros(u64::MAX),
         }
     }
 
@@ -148,14 +142,12 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         let mut tally = Tally::default();
         // Frames of other kinds do not count towards the frames of a reading.
         let (mut frames, mut foreign) = (0, 0);
-        let mut left = budget;
-        while left > 0 {
-            left -= 1;
+        let mut is_empty = false;
+        for _ in 0..budget.saturating_add(self.watch.has_waiting.into()) {
             match self.port.try_receive(&mut frame) {
                 Received::Frame => {
                     if frames % FRAMES_A_READING == 0 {
-                        now = self.time_of_arrival();
-                        left += usize::from(frames == 0 && now < self.watch.reading());
+                        now = self.read_arrival();
                     }
                     frames += 1;
                     if self.take(&frame, now, &mut tally) == Ingest::Unrelated {
@@ -167,12 +159,13 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
                     increment(&mut self.statistics.unrelated);
                 }
                 Received::Empty => {
-                    self.drained = self.watch.reading();
+                    is_empty = true;
                     break;
                 }
                 Received::Failed(kind) => self.note_failure(kind),
             }
         }
+        self.watch.end_receiving(is_empty, self.ticker.period());
         self.enter(frames, &tally);
         // Frames since the last reading.
         let waited = frames.checked_sub(1).map_or(0, |before| before % FRAMES_A_READING + 1);
@@ -287,16 +280,9 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
 
     /// Reads the clock, and returns the time of a frame handed out now.
     #[inline(never)]
-    fn time_of_arrival(&mut self) -> Instant {
-        let reading = self.read_clock();
-        self.drained = self.drained.min(reading);
-        reading.min(self.last_arrival())
-    }
-
-    /// Returns the latest time for a frame of the driver.
-    fn last_arrival(&self) -> Instant {
-        let longest_us = LONGEST_WAIT_PERIODS * self.ticker.period().as_micros();
-        self.drained + Duration::from_micros(longest_us)
+    fn read_arrival(&mut self) -> Instant {
+        let now = self.read_clock();
+        self.watch.arrival(now, self.ticker.period())
     }
 
     #[cold]

@@ -2,7 +2,7 @@
 
 use super::Statistics;
 use super::statistics::{Meter, increment};
-use super::watch::{FrameKey, Pending, Watch};
+use super::watch::{FrameKey, Watch};
 use crate::frame::CanFrame;
 use crate::motor::Devices;
 use crate::time::Instant;
@@ -323,6 +323,35 @@ impl<P: Driver, D: Devices> Sending<'_, P, D> {
     fn count_sent(&mut self, frame: &CanFrame) {
         increment(&mut self.statistics.sent);
         self.meter.count(frame);
+    }
+}
+
+/// Frames of the last tick that the driver did not take.
+#[derive(Debug)]
+pub(super) struct Pending {
+    /// A frame that failed as the first, and therefore goes last in the next tick.
+    pub(super) yields: Option<FrameKey>,
+    /// Frames that found no place wait in the device.
+    pub(super) waits: bool,
+    /// The device was armed in the tick.
+    pub(super) was_armed: bool,
+    /// The emergency stop was set in the tick.
+    pub(super) was_stopped: bool,
+    /// A frame of others, evicted by a frame that waited. Polls offer no more frames then, until the next tick.
+    pub(super) evicted: Option<CanFrame>,
+}
+
+impl Pending {
+    pub(super) const NONE: Self =
+        Self { yields: None, waits: false, was_armed: false, was_stopped: false, evicted: None };
+
+    /// Begins a tick, whose update replaces the frames that wait.
+    #[inline]
+    pub(super) fn hand_over(&mut self, evicted: &mut impl FnMut(&CanFrame)) {
+        self.waits = false;
+        if let Some(frame) = self.evicted.take() {
+            evicted(&frame);
+        }
     }
 }
 

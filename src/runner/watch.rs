@@ -5,7 +5,6 @@ mod edge;
 pub use edge::BusCondition;
 pub(super) use edge::FrameKey;
 
-use crate::frame::CanFrame;
 use crate::motor::take_age;
 use crate::time::{Duration, Instant, Tick};
 use edge::{BusEdge, Edges, Unsent, WATCHED_FRAMES};
@@ -28,6 +27,9 @@ const BUS_LOST_AFTER: Duration = Duration::from_millis(100);
 /// devices has its turn. A frame sent seldom, such as the limits of a drive, may be refused once.
 const FORGOTTEN_AFTER: (Duration, u8) = (Duration::from_secs(1), 32);
 
+/// A program that polls once a period needs two of them to take a frame.
+const LONGEST_WAIT_PERIODS: u64 = 3;
+
 #[derive(Debug)]
 pub(super) struct Watch {
     pub(super) edges: Edges,
@@ -39,6 +41,10 @@ pub(super) struct Watch {
     heard: bool,
     heard_at: Option<Instant>,
     reading: Instant,
+    /// The driver had no received frame then, or the first poll had one.
+    drained: Instant,
+    /// Received frames have waited for longer than [`LONGEST_WAIT_PERIODS`].
+    pub(super) has_waiting: bool,
     ticked: Option<Instant>,
     unsent: [Option<Unsent>; WATCHED_FRAMES],
     has_unsent: bool,
@@ -56,6 +62,8 @@ impl Watch {
             heard: false,
             heard_at: None,
             reading: Instant::START,
+            drained: Instant::from_micros(u64::MAX),
+            has_waiting: false,
             ticked: None,
             unsent: [None; WATCHED_FRAMES],
             has_unsent: false,
@@ -82,9 +90,29 @@ impl Watch {
         self.reading = now;
     }
 
-    /// Returns the last reading of the clock.
-    pub(super) const fn reading(&self) -> Instant {
-        self.reading
+    /// Returns the time of a frame handed out `now`: in doubt, when the driver was last empty.
+    #[inline]
+    pub(super) fn arrival(&mut self, now: Instant, period: Duration) -> Instant {
+        let waited_us = now.as_micros().wrapping_sub(self.drained.as_micros());
+        let is_fresh = waited_us <= LONGEST_WAIT_PERIODS * period.as_micros();
+        if is_fresh { now } else { self.arrival_in_doubt(now, period) }
+    }
+
+    /// The same, also before the driver was ever seen empty, and after a set-back of the clock.
+    #[cold]
+    #[inline(never)]
+    fn arrival_in_doubt(&mut self, now: Instant, period: Duration) -> Instant {
+        self.drained = self.drained.min(now);
+        now.min(self.drained + Duration::from_micros(LONGEST_WAIT_PERIODS * period.as_micros()))
+    }
+
+    /// Notes whether the driver has no frame left.
+    #[inline]
+    pub(super) fn end_receiving(&mut self, is_empty: bool, period: Duration) {
+        if is_empty {
+            self.drained = self.reading;
+        }
+        self.has_waiting = !is_empty && self.arrival(self.reading, period) < self.reading;
     }
 
     /// Returns the time of the last step that was run.
@@ -246,35 +274,6 @@ impl Watch {
 
     pub(super) fn next_edge(&mut self) -> Option<BusEdge> {
         self.edges.next()
-    }
-}
-
-/// Frames of the last tick that the driver did not take.
-#[derive(Debug)]
-pub(super) struct Pending {
-    /// A frame that failed as the first, and therefore goes last in the next tick.
-    pub(super) yields: Option<FrameKey>,
-    /// Frames that found no place wait in the device.
-    pub(super) waits: bool,
-    /// The device was armed in the tick.
-    pub(super) was_armed: bool,
-    /// The emergency stop was set in the tick.
-    pub(super) was_stopped: bool,
-    /// A frame of others, evicted by a frame that waited. Polls offer no more frames then, until the next tick.
-    pub(super) evicted: Option<CanFrame>,
-}
-
-impl Pending {
-    pub(super) const NONE: Self =
-        Self { yields: None, waits: false, was_armed: false, was_stopped: false, evicted: None };
-
-    /// Begins a tick, whose update replaces the frames that wait.
-    #[inline]
-    pub(super) fn hand_over(&mut self, evicted: &mut impl FnMut(&CanFrame)) {
-        self.waits = false;
-        if let Some(frame) = self.evicted.take() {
-            evicted(&frame);
-        }
     }
 }
 
