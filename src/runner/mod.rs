@@ -53,7 +53,7 @@ const FRAMES_A_READING: usize = 16;
 
 /// Moves frames between a driver and a device, at the pace of a clock.
 ///
-/// Takes 700 bytes on a Cortex-M4F, without driver, clock and device (`docs/figures.md`).
+/// Takes 708 bytes on a Cortex-M4F, without driver, clock and device (`docs/figures.md`).
 ///
 /// # Examples
 /// ```
@@ -122,7 +122,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
 
     /// Takes at most `budget` received frames from the driver; frames of others are dropped. Returns how many came.
     ///
-    /// Costs 556 instructions on a Cortex-M4F, for 8 frames of motors (`docs/figures.md`).
+    /// Costs 582 instructions on a Cortex-M4F, for 8 frames of motors (`docs/figures.md`).
     pub fn poll(&mut self, budget: usize) -> usize {
         self.poll_with(budget, |_| {})
     }
@@ -297,7 +297,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
 
     /// Runs one step: update, then send. Drops frames of others that the driver evicts.
     ///
-    /// Costs 650 instructions on a Cortex-M4F, with 8 speed loops (`docs/figures.md`).
+    /// Costs 649 instructions on a Cortex-M4F, with 8 speed loops (`docs/figures.md`).
     pub fn tick(&mut self, tick: Tick) {
         self.tick_with(tick, |_| {});
     }
