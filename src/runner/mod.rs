@@ -122,7 +122,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
 
     /// Takes at most `budget` received frames from the driver; frames of others are dropped. Returns how many came.
     ///
-    /// Costs 582 instructions on a Cortex-M4F, for 8 frames of motors (`docs/figures.md`).
+    /// Costs 566 instructions on a Cortex-M4F, for 8 frames of motors (`docs/figures.md`).
     pub fn poll(&mut self, budget: usize) -> usize {
         self.poll_with(budget, |_| {})
     }
@@ -133,17 +133,16 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// Never waits, continues after errors, and ends: an error counts against the budget as well. The clock is read for
     /// each 16 frames, which have the same time.
     ///
-    /// A budget above the number of frames between two polls leaves the driver empty. Frames wait after a pause of the program, or a budget too
-    /// small for three periods: the motors then count as unheard since the driver was last empty, are late, and relaxed after 100 ms. A poll
-    /// takes a frame beyond the budget meanwhile.
+    /// The budget has to be above the number of frames between two polls: each poll then finds the driver empty. After a pause of the program, or
+    /// with a smaller budget, the time of a frame is at most three periods after a poll last found the driver empty. So the motors are late until
+    /// the driver is empty, and relaxed after 100 ms.
     pub fn poll_with(&mut self, budget: usize, mut unrelated: impl FnMut(&CanFrame)) -> usize {
         self.watch.receive_ran();
         let (mut frame, mut now) = (CanFrame::EMPTY, Instant::START);
         let mut tally = Tally::default();
         // Frames of other kinds do not count towards the frames of a reading.
         let (mut frames, mut foreign) = (0, 0);
-        let mut is_empty = false;
-        for _ in 0..budget.saturating_add(self.watch.has_waiting.into()) {
+        for _ in 0..budget {
             match self.port.try_receive(&mut frame) {
                 Received::Frame => {
                     if frames % FRAMES_A_READING == 0 {
@@ -159,13 +158,12 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
                     increment(&mut self.statistics.unrelated);
                 }
                 Received::Empty => {
-                    is_empty = true;
+                    self.watch.drain();
                     break;
                 }
                 Received::Failed(kind) => self.note_failure(kind),
             }
         }
-        self.watch.end_receiving(is_empty, self.ticker.period());
         self.enter(frames, &tally);
         // Frames since the last reading.
         let waited = frames.checked_sub(1).map_or(0, |before| before % FRAMES_A_READING + 1);

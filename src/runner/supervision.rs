@@ -75,8 +75,8 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         let is_stopped = self.stop.as_ref().is_some_and(WatchedStop::is_set);
         let Some(refusal) = ArmError::around(is_stopped, self.is_bus_down()) else {
             let outcome = self.device.arm(tick.now());
-            return outcome
-                .map_err(|refusal| refusal.on_bus(self.meter.last(), self.watch.has_waiting));
+            let has_waiting = self.watch.has_waiting(self.ticker.period());
+            return outcome.map_err(|refusal| refusal.on_bus(self.meter.last(), has_waiting));
         };
         // A refused request is a request.
         ask(&mut self.device);

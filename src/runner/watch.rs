@@ -43,8 +43,6 @@ pub(super) struct Watch {
     reading: Instant,
     /// The driver had no received frame then, or the first poll had one.
     drained: Instant,
-    /// Received frames have waited for longer than [`LONGEST_WAIT_PERIODS`].
-    pub(super) has_waiting: bool,
     ticked: Option<Instant>,
     unsent: [Option<Unsent>; WATCHED_FRAMES],
     has_unsent: bool,
@@ -63,7 +61,6 @@ impl Watch {
             heard_at: None,
             reading: Instant::START,
             drained: Instant::from_micros(u64::MAX),
-            has_waiting: false,
             ticked: None,
             unsent: [None; WATCHED_FRAMES],
             has_unsent: false,
@@ -106,13 +103,15 @@ impl Watch {
         now.min(self.drained + Duration::from_micros(LONGEST_WAIT_PERIODS * period.as_micros()))
     }
 
-    /// Notes whether the driver has no frame left.
+    /// Notes that the driver has no frame left.
     #[inline]
-    pub(super) fn end_receiving(&mut self, is_empty: bool, period: Duration) {
-        if is_empty {
-            self.drained = self.reading;
-        }
-        self.has_waiting = !is_empty && self.arrival(self.reading, period) < self.reading;
+    pub(super) const fn drain(&mut self) {
+        self.drained = self.reading;
+    }
+
+    /// Tells whether frames may have waited in the driver for longer than [`LONGEST_WAIT_PERIODS`].
+    pub(super) fn has_waiting(&mut self, period: Duration) -> bool {
+        self.arrival(self.reading, period) < self.reading
     }
 
     /// Returns the time of the last step that was run.

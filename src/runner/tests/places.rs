@@ -1,6 +1,7 @@
 //! Frames that find no place in the controller, and stops between two ticks.
 
 use super::*;
+use std::string::ToString;
 use std::vec;
 
 /// A tick in which only the first of both frames finds a place.
@@ -166,33 +167,25 @@ fn a_clear_stops_each_part_first_where_no_tick_has_seen_the_stop() {
     assert!(!runner.device_mut().1.is_armed() && !runner.device_mut().1.is_stopped());
 }
 
-/// An interrupt for each frame, and a poll for each interrupt: the driver is never seen empty.
+/// A frame each half of a millisecond, and a poll for each: with a budget of 1, no poll shows that none is left.
 #[test]
-fn a_program_that_takes_one_frame_a_poll_is_late_for_no_motor() {
-    let clock = Cell::new(Instant::START);
-    let (mut runner, wheels) = driving(&clock);
-    runner.poll(1);
-    for _ in 0..200 {
-        clock.set(clock.get() + Duration::from_millis(1));
-        for id in [0x201, 0x205] {
-            runner.port_mut().0.receive.push_back(Ok(frame(id, [0; 8])));
-            assert_eq!(runner.poll(1), 1);
+fn a_program_learns_that_no_frame_waits_by_a_poll_with_room_for_another() {
+    for (budget, is_fresh) in [(1, false), (2, true)] {
+        let clock = Cell::new(Instant::START);
+        let (mut runner, wheels) = driving(&clock);
+        for _ in 0..200 {
+            clock.set(clock.get() + Duration::from_millis(1));
+            for id in [0x201, 0x205] {
+                runner.port_mut().0.receive.push_back(Ok(frame(id, [0; 8])));
+                assert_eq!(runner.poll(budget), 1);
+            }
+            let tick = runner.due().unwrap();
+            wheels.into_iter().for_each(|wheel| _ = runner.device_mut().set_raw(wheel, 1));
+            runner.tick(tick);
         }
-        let tick = runner.due().unwrap();
-        set(&mut runner, wheels, 1);
-        runner.tick(tick);
+        assert_eq!(runner.is_armed(), is_fresh, "a budget of {budget}");
+        let refused = runner.arm(Tick::new(clock.get(), 0.001)).map_err(|why| why.to_string());
+        let waits = refused.is_err_and(|why| why.contains("received frames wait"));
+        assert_eq!(waits, !is_fresh, "a budget of {budget}");
     }
-    assert!(runner.is_armed());
-    // Three frames are left over, as after a pause: each poll takes one more.
-    runner.port_mut().0.receive.extend((0..3).map(|_| Ok(frame(0x201, [0; 8]))));
-    let mut taken = Vec::new();
-    for _ in 0..12 {
-        clock.set(clock.get() + Duration::from_millis(1));
-        runner.port_mut().0.receive.push_back(Ok(frame(0x205, [0; 8])));
-        taken.push(runner.poll(1));
-        let tick = runner.due().unwrap();
-        runner.tick(tick);
-    }
-    assert_eq!(taken.iter().sum::<usize>(), 15, "{taken:?}");
-    assert_eq!(taken[11], 1);
 }
