@@ -161,7 +161,7 @@ fn hear_command<const N: usize>(motors: &mut Motors<N>, outbox: &Outbox, id: u32
     motors.guard.hear_rival(now.stamp());
     motors.change_all(now, |slot| {
         if slot.facts().is_some() && slot.place.frame() == frame {
-            health::hear_rival(slot);
+            health::begin(slot, Condition::SecondMaster);
         }
     });
 }

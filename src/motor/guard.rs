@@ -380,7 +380,7 @@ impl Guard {
 impl MotorGuard {
     /// Begins a condition that is not ignored.
     pub(crate) fn begin(&mut self, condition: Condition, config: &HealthConfig) {
-        let before = self.latch_mut().active();
+        let before = self.latch().active();
         if !config.ignores(condition) {
             self.latch_mut().set(condition, true);
         }
@@ -389,7 +389,7 @@ impl MotorGuard {
 
     /// Trips the motor if a condition that began since `before` demands rest, or the motor must not be armed.
     pub(crate) const fn react(&mut self, before: Conditions, config: &HealthConfig) {
-        if config.relaxes(before, self.latch_mut().active()) {
+        if config.relaxes(before, self.latch().active()) {
             self.trip();
         }
     }

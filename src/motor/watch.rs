@@ -126,7 +126,7 @@ impl Watch {
         self.next = self.after(now);
         // Another drive may come while nobody counts.
         self.forget_drive();
-        guard.latch(now, |latch| self.monitor.start(latch));
+        guard.change_conditions(now, |latch| self.monitor.start(latch));
     }
 
     /// Checks the motor, relaxes the motor where a condition demands rest, and returns the remaining share of the output.
@@ -195,7 +195,7 @@ impl Watch {
         if guard.link() != Link::Online {
             self.monitor = Monitor::NEW;
         } else {
-            guard.latch(now, |latch| {
+            guard.change_conditions(now, |latch| {
                 self.read_error(latch, &vitals);
                 if let Some(since) = since {
                     let sample = vitals.sample(since, self.config);
@@ -321,11 +321,15 @@ impl Guard {
         if condition == Condition::SecondMaster && holds {
             return self.hear_rival(now);
         }
-        self.latch(now, |latch| latch.set(condition, holds));
+        self.change_conditions(now, |latch| latch.set(condition, holds));
     }
 
     /// Runs a change of the conditions, and notes its consequences.
-    pub(super) fn latch<T>(&mut self, now: Instant, change: impl FnOnce(&mut Latch) -> T) -> T {
+    pub(super) fn change_conditions<T>(
+        &mut self,
+        now: Instant,
+        change: impl FnOnce(&mut Latch) -> T,
+    ) -> T {
         self.change(now, |motor| change(motor.latch_mut()))
     }
 

@@ -227,7 +227,7 @@ const OWN_NAMES: [(&str, &str, &[&str]); 25] = [
     (
         "dji",
         "the core is asked for each motor",
-        &["begin_opening", "hear_rival", "keep_trip_of_others", "rival_among", "take_edge"],
+        &["begin_opening", "keep_trip_of_others", "rival_among", "take_edge"],
     ),
     ("dji", "the integral within the share that the core leaves", &["hold_back", "opened_part"]),
     ("dji", "a command frame is opened for a motor", &["open"]),

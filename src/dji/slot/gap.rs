@@ -76,8 +76,7 @@ fn compare(slot: &mut Slot, feedback: Feedback, gap_us: u32) {
     #[expect(clippy::cast_possible_truncation, reason = "saturates")]
     slot.traffic.compare(counts, predicted as i32, tolerance as i32);
     if slot.traffic.is_double() {
-        slot.guard.begin(Condition::DuplicateId, slot.health);
-        slot.require_check();
+        health::begin(slot, Condition::DuplicateId);
     }
 }
 
@@ -88,7 +87,8 @@ fn move_shortest(slot: &mut Slot, feedback: Feedback) {
 
 fn doubt_position(slot: &mut Slot) {
     slot.ambiguous_gaps = slot.ambiguous_gaps.saturating_add(1);
-    health::begin(slot, Condition::PositionUncertain);
+    slot.guard.latch_mut().set(Condition::PositionUncertain, true);
+    slot.require_check();
     if slot.homing == Homing::Homed && !slot.shaft.is_direct() {
         slot.homing = Homing::Uncertain;
     }

@@ -97,9 +97,9 @@ pub(super) fn waive_check(slot: &mut Slot, facts: &Facts) {
     }
 }
 
-/// Begins a condition that a full check must end or observe.
-pub(super) const fn begin(slot: &mut Slot, condition: Condition) {
-    slot.guard.latch_mut().set(condition, true);
+/// Begins a condition that is not ignored. A full check must end the condition.
+pub(in crate::dji) fn begin(slot: &mut Slot, condition: Condition) {
+    slot.guard.begin(condition, slot.health);
     slot.require_check();
 }
 
@@ -270,12 +270,6 @@ fn close_window(slot: &mut Slot, window: u16, feedback_hz: u32) {
     if was_crowded && !double {
         slot.guard.latch_mut().set(Condition::DuplicateId, false);
     }
-}
-
-/// Notes a command frame of the motor from another node.
-pub(in crate::dji) fn hear_rival(slot: &mut Slot) {
-    slot.guard.begin(Condition::SecondMaster, slot.health);
-    slot.require_check();
 }
 
 /// Returns the state; `None` before the first frame.

@@ -364,7 +364,7 @@ impl<M: DriveProtocol> Actuator<M> {
         if is_lost {
             self.guard.relax();
         }
-        self.guard.latch(now, |latch| Inside::check(inside, is_lost, latch));
+        self.guard.change_conditions(now, |latch| Inside::check(inside, is_lost, latch));
     }
 
     pub(super) fn relax(&mut self) {
