@@ -104,6 +104,18 @@ impl<M: DriveProtocol> Bench<M> {
         self.drives.iter_mut().for_each(|drive| drive.step(dt_s));
     }
 
+    /// Asks in each tick of so many seconds, until armed; returns after how many.
+    fn ask_for(&mut self, seconds: u64) -> u64 {
+        let most = seconds * 1_000_000 / self.period_us;
+        for ticks in 0..most {
+            if self.own.arm(self.now()).is_ok() {
+                return ticks;
+            }
+            self.tick();
+        }
+        most
+    }
+
     fn is_double(&self) -> bool {
         self.own.health().conditions.contains(Condition::DuplicateId)
     }
@@ -178,11 +190,7 @@ fn check_start<M: DriveProtocol>(bench: &dyn Fn(u64) -> Bench<M>, hz: u32) {
     for shown in [1, 2] {
         let mut bench = bench(hz.into());
         bench.shown = shown;
-        let mut ticks = 0;
-        while ticks < 6 * hz && bench.own.arm(bench.now()).is_err() {
-            bench.tick();
-            ticks += 1;
-        }
+        let ticks = bench.ask_for(6);
         assert_eq!(bench.own.is_armed(), shown == 1, "{hz} Hz, {shown} drives");
         // A request in each tick is one request, which a trip would refuse; none tripped.
         assert!(shown == 2 || ticks < 250, "{hz} Hz: {ticks} ticks");
@@ -300,11 +308,7 @@ fn a_second_drive_that_comes_while_driven_is_not_armed_again() {
         bench.run(200);
         Devices::disarm(&mut bench.own);
         bench.run(pause_ms);
-        let mut ticks = 0;
-        while ticks < 3 * hz && bench.own.arm(bench.now()).is_err() {
-            bench.tick();
-            ticks += 1;
-        }
+        let ticks = bench.ask_for(3);
         assert!(!bench.own.is_armed(), "{hz} Hz, {pause_ms} ms, after {ticks} updates");
     }
 }
@@ -404,11 +408,7 @@ fn two_drives_are_found_where_a_second_master_is_ignored() {
         let mut bench = damiao(hz);
         bench.own = bench.own.with_health(&TOLERANT).unwrap();
         bench.shown = shown;
-        let mut ticks = 0;
-        while ticks < 5 * hz && bench.own.arm(bench.now()).is_err() {
-            bench.tick();
-            ticks += 1;
-        }
+        let ticks = bench.ask_for(5);
         assert_eq!(bench.own.is_armed(), shown == 1, "{hz} Hz, {shown} drives, {ticks} updates");
         assert_eq!(bench.is_double(), shown == 2, "{hz} Hz, {shown} drives");
     }
