@@ -2,7 +2,7 @@
 
 use crate::time::{Duration, Instant, Tick};
 
-/// The switch by which a person arms a robot: only its turn from off to on does, and none with a stick held, for the robot would leap.
+/// The switch by which a person arms a robot: a turn from off to on asks to arm, unless a stick is held, since the robot would leap.
 ///
 /// The position is unknown while a remote control is not heard. If the switch was turned on before, the robot [brakes](SwitchOrder::Brake) for a
 /// second, and is disarmed: a stop of category 1 in IEC 60204-1. Disarmed at once, a robot rolls on for metres. A switch that is on at power-on, after
