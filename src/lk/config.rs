@@ -51,9 +51,10 @@ impl Mode {
     /// A limit beyond the ranges of the model.
     pub(crate) fn check(&self, scale: &Scale) -> Result<(), ConfigError> {
         let has_limit = self.0.number == VELOCITY && self.0.torque_limit_nm().is_some();
-        if has_limit && !scale.limits_torque {
-            return Err(ConfigError::Unsupported("torque limit of a velocity"));
-        }
+        ConfigError::check_support(
+            !has_limit || scale.limits_torque,
+            "torque limit of a velocity",
+        )?;
         self.0.check(scale.max_velocity, scale.torque_per_count, scale.max_torque_nm)
     }
 

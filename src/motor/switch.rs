@@ -79,7 +79,7 @@ impl ArmingSwitch {
 pub enum SwitchOrder {
     /// The switch was turned on just now, and nothing asks for a motion.
     Arm,
-    /// The switch is on as before: armed motors stay armed, and others disarmed.
+    /// The switch is on as before, or was turned on with a stick held: armed motors stay armed, and others disarmed.
     Keep,
     /// The position of a switch that was turned on was lost less than a second ago: armed motors stay armed, and get the targets of a robot
     /// that stands.

@@ -123,9 +123,8 @@ impl Motor {
         endpoints: Endpoints,
         watchdog: Duration,
     ) -> Result<Self, ConfigError> {
-        if self.firmware == Firmware::V0_5 {
-            return Err(ConfigError::Unsupported("endpoints over CAN (set the watchdog by USB)"));
-        }
+        let has_endpoints = self.firmware != Firmware::V0_5;
+        ConfigError::check_support(has_endpoints, "endpoints over CAN (set the watchdog by USB)")?;
         let micros =
             ConfigError::check_micros("watchdog in us", watchdog.micros_u32(), 10_000, 10_000_000)?;
         let endpoints = endpoints.preparations(&self.mode, micros as f32 * 1e-6);
