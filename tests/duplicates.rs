@@ -413,3 +413,18 @@ fn two_drives_are_found_where_a_second_master_is_ignored() {
         assert_eq!(bench.is_double(), shown == 2, "{hz} Hz, {shown} drives");
     }
 }
+
+/// The checks of a driven motor are 8 ms apart: its answers until then are none of the rest.
+#[test]
+fn one_drive_stays_one_whenever_its_target_ends() {
+    for hz in [500, 1_000, 2_000, 2_500, 3_000, 4_000, 5_000] {
+        let mut bench = damiao(hz);
+        bench.run(2_500);
+        bench.own.arm(bench.now()).unwrap();
+        for pause in 0..60 {
+            bench.run(100);
+            (0..hz / 5 + pause).for_each(|_| bench.tick());
+            assert!(bench.own.is_armed() && !bench.is_double(), "{hz} Hz, pause {pause}");
+        }
+    }
+}

@@ -68,10 +68,7 @@ impl Watch {
     pub(crate) fn hear(&mut self, gap_us: Option<u32>, now: Instant) {
         match gap_us {
             Some(gap_us) => self.traffic.gap(gap_us),
-            None => {
-                self.window_from = now;
-                self.forget_drive();
-            }
+            None => (self.window_from, self.answers) = (now, Answers::NONE),
         }
         self.traffic.count();
         self.answers.add(1);
@@ -98,6 +95,12 @@ impl Watch {
     /// Returns the time of the next check of slow quantities: until then, a motor without a condition needs none.
     pub(crate) const fn next(&self) -> Instant {
         self.next
+    }
+
+    /// Begins a rest: answers to commands are none to the frames of the rest.
+    pub(crate) fn begin_rest(&mut self, guard: &mut Guard) {
+        self.traffic.add(guard.take_in_time());
+        self.answers.begin();
     }
 
     /// Notes so many frames to a drive at rest that sends nothing but answers.

@@ -370,6 +370,7 @@ impl<M: DriveProtocol> Actuator<M> {
     pub(super) fn relax(&mut self) {
         if !self.is_resting {
             self.start = Start::NONE;
+            self.watch.begin_rest(&mut self.guard);
             self.motor.reset();
             self.is_resting = true;
         }
