@@ -149,6 +149,14 @@ impl ConfigError {
         if is_supported { Ok(()) } else { Err(Self::Unsupported(parameter)) }
     }
 
+    /// Refuses a value that excludes another.
+    pub(crate) const fn check_conflict(
+        conflicts: bool,
+        parameter: &'static str,
+    ) -> Result<(), Self> {
+        if conflicts { Err(Self::Conflict(parameter)) } else { Ok(()) }
+    }
+
     /// Accepts a limit above 0 and at most `most`.
     pub(crate) const fn check_limit(
         parameter: &'static str,

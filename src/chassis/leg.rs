@@ -85,9 +85,7 @@ impl FiveBar {
         check!(positive(hip_m, "hip_m"));
         check!(positive(upper_m, "upper_m"));
         check!(positive(lower_m, "lower_m"));
-        if lower_m <= upper_m + hip_m {
-            return Err(ConfigError::Conflict("lower_m"));
-        }
+        check!(ConfigError::check_conflict(lower_m <= upper_m + hip_m, "lower_m"));
         Ok(Self { hip_m, upper_m, lower_m })
     }
 

@@ -98,9 +98,8 @@ impl Motor {
     /// [`ConfigError::Range`] for another id; [`ConfigError::Conflict`] for the id of the motor's own commands.
     pub fn with_master_id(self, master_id: u16) -> Result<Self, ConfigError> {
         ConfigError::check_range("master id", master_id.into(), 0.0, 2046.0)?;
-        if [self.command_id.as_raw(), self.id.into()].contains(&master_id) {
-            return Err(ConfigError::Conflict("master id"));
-        }
+        let is_taken = [self.command_id.as_raw(), self.id.into()].contains(&master_id);
+        ConfigError::check_conflict(is_taken, "master id")?;
         Ok(Self { master_id, ..self })
     }
 

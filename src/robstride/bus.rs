@@ -21,7 +21,7 @@ const COMMANDS: [(u32, u32); 3] =
 
 /// A motor of this family in a run mode: see the [module](super).
 ///
-/// Costs 3757 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
+/// Costs 3743 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
 ///
 /// Costs 138 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
 ///
@@ -59,6 +59,8 @@ pub struct Motor {
     settings: Settings<Register, 3>,
     /// A command to be sent once at rest. The settings are unknown until then: the position changes with the zero, and all with the id.
     once: Option<Command>,
+    /// The drive was told to run, and not to stop since.
+    runs: bool,
     /// Counts questions.
     questions: u8,
     /// Counts the disabling frames since the drive reported a fault.
@@ -89,6 +91,7 @@ impl Motor {
             has_cleared: false,
             settings: Settings::new([Register::RunMode, Register::MechanicalPosition, last]),
             once: None,
+            runs: false,
             questions: 0,
             turn: 0,
         })
@@ -99,9 +102,7 @@ impl Motor {
     /// # Errors
     /// [`ConfigError::Conflict`] for the id of this motor. A conflict with another motor is found where both are attached.
     pub fn with_host_id(self, host: u8) -> Result<Self, ConfigError> {
-        if host == self.id {
-            return Err(ConfigError::Conflict("host id"));
-        }
+        ConfigError::check_conflict(host == self.id, "host id")?;
         Ok(Self { host, ..self })
     }
 
@@ -143,7 +144,7 @@ impl Motor {
     /// the supply if [stored](Self::store), a CyberGear does not.
     ///
     /// # Errors
-    /// [`ConfigError::Unsupported`] while the drive reports that it runs: the shaft would jump.
+    /// [`ConfigError::Unsupported`] from when the drive is enabled until it reports that it rests: the shaft would jump.
     pub fn set_zero(&mut self) -> Result<(), ConfigError> {
         self.request(Command::SetZero)
     }
@@ -156,15 +157,13 @@ impl Motor {
     /// [`set_zero`](Self::set_zero).
     pub fn set_id(&mut self, id: u8) -> Result<(), ConfigError> {
         ConfigError::check_range("id", id.into(), 1.0, 127.0)?;
-        if id == self.host {
-            return Err(ConfigError::Conflict("id"));
-        }
+        ConfigError::check_conflict(id == self.host, "id")?;
         self.request(Command::SetId(id))
     }
 
     fn request(&mut self, command: Command) -> Result<(), ConfigError> {
-        let is_running = self.is_enabled() == Some(true);
-        ConfigError::check_support(!is_running, "zero or id of a running drive")?;
+        let runs = self.runs || self.is_enabled() == Some(true);
+        ConfigError::check_support(!runs, "zero or id of a running drive")?;
         self.once = Some(command);
         self.settings.forget();
         Ok(())
@@ -245,7 +244,6 @@ impl DriveProtocol for Motor {
     }
 
     fn control(&mut self, order: Order) -> CanFrame {
-        self.once = None;
         let shaft = (self.angle(), self.velocity());
         match self.drive.and_then(|_| self.mode.command(order, shaft, &self.model)) {
             Some(Command::Operation(command)) => operation(&command, &self.model, self.id),
@@ -274,10 +272,12 @@ impl DriveProtocol for Motor {
             self.settings.forget();
         }
         let command = self.once.take().unwrap_or(asked.map_or(Command::Enable, Command::of));
+        self.runs |= matches!(command, Command::Enable);
         Some(self.frame_of(command))
     }
 
     fn disable(&mut self) -> Option<CanFrame> {
+        self.runs = false;
         self.settings.prepare_anew();
         self.mode.rest().is_some().then(|| self.off())
     }

@@ -568,6 +568,26 @@ fn a_zero_that_is_asked_for_once_armed_is_set_before_the_drive_is_enabled() {
     }
 }
 
+/// The answer to the enabling frame may be late: the last report is one of rest.
+#[test]
+fn a_zero_is_refused_from_the_enabling_frame_on_and_not_before() {
+    let mut bench = Bench::new(operation());
+    bench.steps(300, |_| {});
+    bench.own.arm(bench.now()).unwrap();
+    let (mut is_told, mut refusals) = (false, 0);
+    bench.steps(300, |bench| {
+        _ = bench.own.set_torque(0.0);
+        is_told |= bench.frames.iter().any(|frame| kind(frame) == 3);
+        let refused = is_told && bench.own.motor_mut().set_zero().is_err();
+        assert_eq!(refused, is_told);
+        refusals += u32::from(refused);
+    });
+    assert!(refusals > 200, "{refusals}");
+    bench.own.disarm();
+    bench.steps(100, |_| {});
+    bench.own.motor_mut().set_zero().unwrap();
+}
+
 /// The driver refuses the frame with the zero, and takes all others.
 #[test]
 fn a_zero_that_no_driver_took_is_sent_later() {

@@ -297,9 +297,7 @@ impl PidConfig {
         check!(off_or_positive("period", self.period));
         check!(off_or_positive("derivative_filter", p.derivative_time_s));
         check!(off_or_positive("back_calculation", p.drain_time_s));
-        if self.tracking_r > 0.0 && self.period > 0.0 {
-            return Err(ConfigError::Conflict("r"));
-        }
+        check!(ConfigError::check_conflict(self.tracking_r > 0.0 && self.period > 0.0, "r"));
         off_or_positive("r", self.tracking_r)
     }
 
