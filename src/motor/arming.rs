@@ -98,7 +98,7 @@ impl core::fmt::Display for Missing {
             more => write!(f, " and {more} more")?,
         }
         if self.has_waiting {
-            f.write_str("; received frames wait: poll oftener, or with a larger budget")?;
+            f.write_str("; received frames wait: poll oftener, with a larger budget, or set the period of the loop (with_period)")?;
         }
         let Some(load) = self.full_bus else { return Ok(()) };
         write!(

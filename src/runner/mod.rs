@@ -120,9 +120,10 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         }
     }
 
-    /// Takes at most `budget` received frames from the driver; frames of others are dropped. Returns how many came.
+    /// Takes at most `budget` received frames from the driver, as [`poll_with`](Self::poll_with); frames of others are dropped. Returns how many
+    /// came.
     ///
-    /// Costs 566 instructions on a Cortex-M4F, for 8 frames of motors (`docs/figures.md`).
+    /// Costs 590 instructions on a Cortex-M4F, for 8 frames of motors (`docs/figures.md`).
     pub fn poll(&mut self, budget: usize) -> usize {
         self.poll_with(budget, |_| {})
     }
@@ -133,9 +134,9 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// Never waits, continues after errors, and ends: an error counts against the budget as well. The clock is read for
     /// each 16 frames, which have the same time.
     ///
-    /// The budget has to be above the number of frames between two polls: each poll then finds the driver empty. After a pause of the program, or
-    /// with a smaller budget, the time of a frame is at most three periods after a poll last found the driver empty. So the motors are late until
-    /// the driver is empty, and relaxed after 100 ms.
+    /// The budget has to be above the number of frames between two polls, so that each poll finds the driver empty: 16 for 8 motors at 1 kHz. If
+    /// the program pauses, or the budget is smaller, a frame is stamped three [periods](Self::with_period) after the driver was last found
+    /// empty, at the latest. The age of this stamp makes the motors late or offline until the driver is empty. An error is no empty driver.
     pub fn poll_with(&mut self, budget: usize, mut unrelated: impl FnMut(&CanFrame)) -> usize {
         self.watch.receive_ran();
         let (mut frame, mut now) = (CanFrame::EMPTY, Instant::START);
@@ -158,7 +159,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
                     increment(&mut self.statistics.unrelated);
                 }
                 Received::Empty => {
-                    self.watch.drain();
+                    self.drain(frames > 0);
                     break;
                 }
                 Received::Failed(kind) => self.note_failure(kind),
@@ -274,6 +275,12 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         let now = self.clock.now();
         self.watch.read(now);
         now
+    }
+
+    /// Notes that the driver has no frame left. `is_read` tells whether this poll has read the clock.
+    #[inline(never)]
+    fn drain(&mut self, is_read: bool) {
+        self.watch.drained = if is_read { self.watch.reading } else { self.clock.now() };
     }
 
     /// Reads the clock, and returns the time of a frame handed out now.

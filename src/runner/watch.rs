@@ -40,9 +40,9 @@ pub(super) struct Watch {
     received: bool,
     heard: bool,
     heard_at: Option<Instant>,
-    reading: Instant,
+    pub(super) reading: Instant,
     /// The driver had no received frame then, or the first poll had one.
-    drained: Instant,
+    pub(super) drained: Instant,
     ticked: Option<Instant>,
     unsent: [Option<Unsent>; WATCHED_FRAMES],
     has_unsent: bool,
@@ -100,18 +100,16 @@ impl Watch {
     #[inline(never)]
     fn arrival_in_doubt(&mut self, now: Instant, period: Duration) -> Instant {
         self.drained = self.drained.min(now);
-        now.min(self.drained + Duration::from_micros(LONGEST_WAIT_PERIODS * period.as_micros()))
+        now.min(self.last_arrival(period))
     }
 
-    /// Notes that the driver has no frame left.
-    #[inline]
-    pub(super) const fn drain(&mut self) {
-        self.drained = self.reading;
+    /// Tells whether frames may have waited in the driver for longer than [`LONGEST_WAIT_PERIODS`]; not before the first poll.
+    pub(super) fn has_waiting(&self, period: Duration) -> bool {
+        self.last_arrival(period) < self.reading
     }
 
-    /// Tells whether frames may have waited in the driver for longer than [`LONGEST_WAIT_PERIODS`].
-    pub(super) fn has_waiting(&mut self, period: Duration) -> bool {
-        self.arrival(self.reading, period) < self.reading
+    fn last_arrival(&self, period: Duration) -> Instant {
+        self.drained + Duration::from_micros(LONGEST_WAIT_PERIODS * period.as_micros())
     }
 
     /// Returns the time of the last step that was run.

@@ -1,6 +1,7 @@
 //! Frames that find no place in the controller, and stops between two ticks.
 
 use super::*;
+use crate::motor::Link;
 use std::string::ToString;
 use std::vec;
 
@@ -188,4 +189,39 @@ fn a_program_learns_that_no_frame_waits_by_a_poll_with_room_for_another() {
         let waits = refused.is_err_and(|why| why.contains("received frames wait"));
         assert_eq!(waits, !is_fresh, "a budget of {budget}");
     }
+}
+
+/// A timer makes the ticks, so nothing but a poll reads the clock; one frame comes each 8 ms.
+#[test]
+fn a_program_without_due_hears_a_motor_of_125_hz() {
+    let clock = Cell::new(Instant::START);
+    let (mut runner, wheels) = driving(&clock);
+    for ms in 1..2_000 {
+        clock.set(clock.get() + Duration::from_millis(1));
+        if ms % 8 == 0 {
+            runner.port_mut().0.receive.extend([0x201, 0x205].map(|id| Ok(frame(id, [0; 8]))));
+        }
+        runner.poll(16);
+        runner.tick(Tick::new(clock.get(), 0.001));
+        let links = wheels.map(|wheel| runner.device().link(wheel));
+        assert_eq!(links, [Some(Link::Online); 2], "{ms} ms");
+    }
+}
+
+/// The clock counts from the reset, and the program begins later; frames come from its second poll on.
+#[test]
+fn a_program_that_begins_late_in_the_time_of_its_clock_has_no_edge() {
+    let clock = Cell::new(Instant::from_micros(200_000));
+    let mut bus = Bus::new();
+    let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
+    let mut runner = Runner::new(Nb(Scripted::default()), &clock, bus);
+    for ms in 0..20 {
+        runner.poll(16);
+        runner.port_mut().0.receive.push_back(Ok(frame(0x201, [0; 8])));
+        let tick = runner.due().unwrap();
+        runner.tick(tick);
+        clock.set(clock.get() + Duration::from_millis(1));
+        assert_eq!(Devices::next_edge(runner.device_mut()), None, "{ms} ms");
+    }
+    assert_eq!(runner.device().link(wheel), Some(Link::Online));
 }
