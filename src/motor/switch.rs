@@ -5,8 +5,9 @@ use crate::time::{Duration, Instant, Tick};
 /// The switch by which a person arms a robot: a turn from off to on asks to arm, unless a stick is held, since the robot would leap.
 ///
 /// The position is unknown while a remote control is not heard. If the switch was turned on before, the robot [brakes](SwitchOrder::Brake) for a
-/// second, and is disarmed: a stop of category 1 in IEC 60204-1. Disarmed at once, a robot rolls on for metres. A switch that is on at power-on, after
-/// the reset of a watchdog, after a turn with a stick held, or when the remote control is heard again, arms nothing until it was off.
+/// second, and is disarmed: a stop of category 1 in IEC 60204-1. Disarmed at once, a robot rolls on for metres. The switch has to be turned off
+/// first if the switch is on at power-on, after the reset of a watchdog, or when the remote control is heard again, or was turned on with a stick
+/// held.
 ///
 /// # Examples
 /// ```
@@ -52,18 +53,19 @@ impl ArmingSwitch {
         Self { position: SwitchPosition::Unknown }
     }
 
-    /// Takes the position, on or off, and `None` while it is not known, and whether the robot is asked for no motion: once a tick.
+    /// Takes the position of the switch once a tick: on, off, or `None` while the position is not known. `sticks_rest` is `false` while a stick,
+    /// or anything else, asks for a motion: a turn of the switch then arms nothing.
     #[must_use]
-    pub fn read(&mut self, is_on: Option<bool>, is_at_rest: bool, tick: Tick) -> SwitchOrder {
+    pub fn read(&mut self, is_on: Option<bool>, sticks_rest: bool, tick: Tick) -> SwitchOrder {
         use SwitchPosition::{Lost, Off, On, Unknown};
         let now = tick.now();
         let (position, order) = match (self.position, is_on) {
             (_, Some(false)) => (Off, SwitchOrder::Disarm),
-            (Off, Some(true)) if is_at_rest => (On, SwitchOrder::Arm),
+            (Off, Some(true)) if sticks_rest => (On, SwitchOrder::Arm),
             (Off, Some(true)) => (Unknown, SwitchOrder::Keep),
             (Unknown | On, Some(true)) => (self.position, SwitchOrder::Keep),
             (On, None) => (Lost(now), SwitchOrder::Brake),
-            (Lost(from), _) if now.since(from) < Self::BRAKING => {
+            (Lost(from), _) if from <= now && now.since(from) < Self::BRAKING => {
                 (self.position, SwitchOrder::Brake)
             }
             _ => (Unknown, SwitchOrder::Disarm),
