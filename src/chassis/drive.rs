@@ -78,7 +78,7 @@ impl<K: Kinematics<Speed = AngularVelocity>> Chassis<K> {
     /// over: it discards the angles to hold, and when a motor takes its target again, the command is approached from the
     /// measured motion. An application that stops a chassis with a lost wheel disarms its devices.
     ///
-    /// Costs 1124 instructions on a Cortex-M4F, for four M3508 and mecanum wheels (`docs/figures.md`).
+    /// Costs 1125 instructions on a Cortex-M4F, for four M3508 and mecanum wheels (`docs/figures.md`).
     ///
     /// # Examples
     /// Front wheels on one bus, rear wheels on another:

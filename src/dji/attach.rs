@@ -130,7 +130,7 @@ pub(super) fn arm_only<const N: usize>(
             engage(motors, place..place + 1, now);
         }
     }
-    keep_trip_of_others(motors);
+    motors.end_arming();
     Ok(())
 }
 
@@ -141,13 +141,6 @@ pub(super) fn engage<const N: usize>(motors: &mut Motors<N>, slots: Range<u8>, n
         if slot.is_some_and(|slot| motors.guard.may_engage(&slot.guard, now)) {
             motors.change(index, now, |slot| health::engage(slot, now.stamp()));
         }
-    }
-}
-
-/// Keeps the trip if a motor without an arming still waits to be armed.
-pub(super) fn keep_trip_of_others<const N: usize>(motors: &mut Motors<N>) {
-    if motors.slots.iter().any(|slot| slot.guard.is_tripped()) {
-        motors.guard.keep_trip();
     }
 }
 

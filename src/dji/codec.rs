@@ -323,15 +323,17 @@ impl Range {
 
     /// Both directions up to `limit`, which must not be negative.
     pub(super) const fn within(limit: i16) -> Self {
-        Self { lowest: -limit, span: 2 * limit.cast_unsigned() }
+        Self::between(limit, limit)
     }
 
-    pub(super) const fn without_negative(self) -> Self {
-        Self { lowest: 0, span: self.highest().cast_unsigned() }
+    /// Down to -`below` and up to `above`, neither of which may be negative.
+    pub(super) const fn between(below: i16, above: i16) -> Self {
+        Self { lowest: -below, span: below.cast_unsigned() + above.cast_unsigned() }
     }
 
-    pub(super) const fn without_positive(self) -> Self {
-        Self { lowest: self.lowest, span: self.lowest.unsigned_abs() }
+    /// Returns the commands within both ranges.
+    pub(super) fn and(self, other: Self) -> Self {
+        Self::between(-self.lowest.max(other.lowest), self.highest().min(other.highest()))
     }
 
     /// Tells whether a command is within the range. One comparison covers both ends: as unsigned, a value below the lowest is far above.

@@ -78,7 +78,7 @@ impl<B, const N: usize> CanDevice for Bus<B, N> {
         if !self.motors.guard.is_far(now) && self.motors.guard.begin_arming(now) {
             let all = 0..self.motors.used;
             attach::engage(&mut self.motors, all, now);
-            attach::keep_trip_of_others(&mut self.motors);
+            self.motors.end_arming();
         }
     }
 

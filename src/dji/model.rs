@@ -323,8 +323,8 @@ mod tests {
         #[test]
         fn the_nearest_is_within(limit in 0..=i16::MAX, raw: i32, negative: bool, positive: bool) {
             let range = Range::within(limit);
-            let range = if negative { range } else { range.without_negative() };
-            let range = if positive { range } else { range.without_positive() };
+            let range = if negative { range } else { range.and(Range::between(0, i16::MAX)) };
+            let range = if positive { range } else { range.and(Range::between(i16::MAX, 0)) };
             let nearest = range.nearest(raw);
             prop_assert!(range.contains(nearest.into()) && range.contains(0));
             prop_assert!(nearest >= 0 || negative);

@@ -113,7 +113,7 @@ impl<const N: usize> Motors<N> {
 
     /// Removes the motor of a slot from the list of ids.
     pub(super) fn forget(&mut self, index: u8) {
-        self.guard.journal_mut().forget(index);
+        self.guard.journal.forget(index);
         for place in &mut self.places {
             if *place == index {
                 *place = Self::NOBODY;
@@ -221,6 +221,12 @@ impl<const N: usize> Motors<N> {
     pub(super) fn pass_unwatched(&mut self, now: Instant) {
         let (guard, slots) = self.parts();
         guard.pass_unwatched(slots, now);
+    }
+
+    /// Ends an arming.
+    pub(super) fn end_arming(&mut self) {
+        let (guard, slots) = self.parts();
+        guard.end_arming(slots);
     }
 
     /// [Changes](Self::change) each slot that may be in use.

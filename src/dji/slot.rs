@@ -14,7 +14,7 @@ use super::{Facts, Feedback};
 use crate::control::{ErrorPid, Pid, PidConfig};
 use crate::encoder::{GearRatio, Homing, Position, Shaft, shortest};
 use crate::error::ConfigError;
-use crate::motor::{HealthConfig, Link, Monitor, MotorGuard, MotorName, Traffic};
+use crate::motor::{HealthConfig, Monitor, MotorGuard, MotorName, Traffic};
 use crate::time::TimeStep;
 use crate::units::AngularVelocity;
 
@@ -279,9 +279,8 @@ impl Slot {
     #[inline]
     pub(super) fn renew_velocity(&mut self, motor: Key, rad_per_s: f32, now: u32) -> bool {
         let goes_on = self.asked == Action::Velocity
-            && self.guard.link() == Link::Online
             && self.generation == motor.generation()
-            && rad_per_s.is_finite();
+            && self.guard.may_renew_target(rad_per_s.is_finite());
         if goes_on {
             self.goal.value = rad_per_s.to_bits().cast_signed();
             self.guard.renew_target(now);
@@ -293,9 +292,8 @@ impl Slot {
     #[inline]
     pub(super) fn renew_position(&mut self, motor: Key, position: Position, now: u32) -> bool {
         let goes_on = self.asked == Action::Position
-            && self.guard.link() == Link::Online
             && self.generation == motor.generation()
-            && position.is_finite()
+            && self.guard.may_renew_target(position.is_finite())
             && self.health.soft_limits.is_none();
         if goes_on {
             let (turns, phase) = self.shaft.locate(position);

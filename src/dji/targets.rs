@@ -89,11 +89,7 @@ impl<B, const N: usize> Bus<B, N> {
     /// ```
     #[inline]
     pub fn next_edge(&mut self) -> Option<Edge<Condition, MotorName>> {
-        if self.motors.guard.journal().is_empty() {
-            None
-        } else {
-            watch::take_edge(&mut self.motors)
-        }
+        if self.motors.guard.journal.is_empty() { None } else { watch::take_edge(&mut self.motors) }
     }
 
     /// Arms every motor: before, all outputs are zero. After a trip, arming is granted only after 100 ms of updates without a request.
@@ -123,14 +119,14 @@ impl<B, const N: usize> Bus<B, N> {
 
     /// Relaxes every motor at once, until the stop is cleared and the bus armed.
     pub fn emergency_stop(&mut self) {
-        if self.motors.guard.stop() {
+        if self.motors.guard.set_stop(true) {
             Self::disarm(self);
         }
     }
 
     /// Clears the emergency stop. The bus stays disarmed, and arming needs a new request.
     pub const fn clear_emergency_stop(&mut self) {
-        self.motors.guard.clear_stop();
+        self.motors.guard.set_stop(false);
     }
 
     /// Tells whether the emergency stop is set.
@@ -244,7 +240,7 @@ impl<B, const N: usize> Bus<B, N> {
 
     /// Sets the multi-turn position for the position loop, clamped to the soft limits if there are any.
     ///
-    /// Costs 73 instructions on a Cortex-M4F (`docs/figures.md`).
+    /// Costs 74 instructions on a Cortex-M4F (`docs/figures.md`).
     ///
     /// # Errors
     /// Fails unless the motor is armed, online and has a position loop, and for NaN and infinity.
@@ -287,8 +283,10 @@ impl<B, const N: usize> Bus<B, N> {
         motor: impl Into<AnyHandle<B>>,
         position: Position,
     ) -> Result<(), TargetError> {
-        self.motors
-            .change_present(motor.into().key(), |slot| gap::set_present_position(slot, position))
+        let now = self.motors.guard.now();
+        self.motors.change_present(motor.into().key(), |slot| {
+            gap::set_present_position(slot, position, now)
+        })
     }
 
     /// Changes the speed loop of a running motor, without a jump of its output.

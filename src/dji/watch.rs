@@ -172,8 +172,8 @@ pub(super) fn take_edge<const N: usize>(
     motors: &mut Motors<N>,
 ) -> Option<Edge<Condition, MotorName>> {
     let updated = motors.guard.updated();
-    while let Some(entry) = motors.guard.journal_mut().pop() {
-        let at = motors.guard.journal().time_of(&entry, updated);
+    while let Some(entry) = motors.guard.journal.pop() {
+        let at = motors.guard.journal.time_of(&entry, updated);
         let Some(slot) = motors.slots.get_mut(usize::from(entry.motor)) else { continue };
         let Some(motor) = slot.name() else { continue };
         let (condition, began) = (entry.condition, entry.began);
@@ -181,7 +181,7 @@ pub(super) fn take_edge<const N: usize>(
             return Some(Edge { source: motor, condition, began, at });
         }
     }
-    let at = motors.guard.journal().last_time(updated);
+    let at = motors.guard.journal.last_time(updated);
     let edge = motors.slots.iter_mut().find_map(|slot| {
         let motor = slot.name()?;
         let (condition, began) = slot.guard.latch().next()?;
@@ -189,7 +189,7 @@ pub(super) fn take_edge<const N: usize>(
         Some(Edge { source: motor, condition, began, at })
     });
     if edge.is_none() {
-        motors.guard.journal_mut().clear();
+        motors.guard.journal.clear();
     }
     edge
 }

@@ -20,9 +20,7 @@ pub(crate) fn furthest(gap_s: f32, velocity: f32, (to_target, speed): (f32, f32)
     8.0 * gap_s + limited(1.5 * velocity * time_s, asked, f32::MAX)
 }
 
-/// Decides whether one motor may be driven: for motors outside the families of this crate.
-///
-/// Applies the rules of all motors of this crate to one motor of your own:
+/// Decides whether one motor of your own may be driven, by the rules of all motors of this crate:
 ///
 /// * Before arming, the output is zero. After a trip, a request to arm counts only after 100 ms without a request.
 /// * Late or lost feedback, and a target that is old, NaN or infinite, give zero.
@@ -133,7 +131,7 @@ impl Guard {
     }
 
     /// Changes the motor, and notes the consequences.
-    pub(super) fn change<T>(
+    pub(crate) fn change<T>(
         &mut self,
         now: Instant,
         change: impl FnOnce(&mut MotorGuard) -> T,
@@ -154,6 +152,11 @@ impl Guard {
         }
         self.motor.take_target(self.device.now());
         Ok(())
+    }
+
+    /// Refuses a target from a zero that is not known, which is `None`, and discards the target before.
+    pub(crate) fn require_zero<T>(&mut self, target: Option<T>) -> Result<T, TargetError> {
+        self.motor.require_zero(target)
     }
 
     /// Moves the time on to a tick and tells whether the motor may be driven in this tick. If not, send zero. If
@@ -281,14 +284,14 @@ impl Guard {
 
     /// Sets the emergency stop: disarms, and stays so until cleared and armed.
     pub const fn emergency_stop(&mut self) {
-        if self.device.stop() {
+        if self.device.set_stop(true) {
             self.motor.disarm();
         }
     }
 
     /// Clears the emergency stop; the motor stays disarmed.
     pub const fn clear_emergency_stop(&mut self) {
-        self.device.clear_stop();
+        self.device.set_stop(false);
     }
 
     /// Tells whether targets are taken: armed, and not relaxed by a fault since.
@@ -378,12 +381,10 @@ impl Guard {
 
 /// Consequences of the conditions of a motor.
 impl MotorGuard {
-    /// Begins a condition that is not ignored.
-    pub(crate) fn begin(&mut self, condition: Condition, config: &HealthConfig) {
+    /// Sets whether a condition holds that is not ignored, and takes its consequences.
+    pub(crate) fn judge(&mut self, condition: Condition, holds: bool, config: &HealthConfig) {
         let before = self.latch().active();
-        if !config.ignores(condition) {
-            self.latch_mut().set(condition, true);
-        }
+        self.latch_mut().set(condition, holds && !config.ignores(condition));
         self.react(before, config);
     }
 

@@ -360,16 +360,16 @@ impl Guard {
     /// ```
     pub fn next_edge(&mut self, motor: MotorName) -> Option<Edge<Condition, MotorName>> {
         let now = self.device.updated();
-        while let Some(entry) = self.device.journal_mut().pop() {
+        while let Some(entry) = self.device.journal.pop() {
             if self.motor.latch_mut().take(entry.condition, entry.began) {
-                let at = self.device.journal().time_of(&entry, now);
+                let at = self.device.journal.time_of(&entry, now);
                 let (condition, began) = (entry.condition, entry.began);
                 return Some(Edge { source: motor, condition, began, at });
             }
         }
         let (condition, began) = self.motor.latch().next()?;
         self.motor.latch_mut().take(condition, began);
-        Some(Edge { source: motor, condition, began, at: self.device.journal().last_time(now) })
+        Some(Edge { source: motor, condition, began, at: self.device.journal.last_time(now) })
     }
 
     /// Returns the part of a motor's health that the guard holds.
@@ -393,7 +393,7 @@ impl Guard {
     /// Returns the time of the edge that [`next_edge`](Self::next_edge) returns next: to read several motors in order.
     pub(crate) fn next_edge_at(&self) -> Option<Instant> {
         self.motor.latch().next()?;
-        let (journal, now) = (self.device.journal(), self.device.updated());
+        let (journal, now) = (self.device.journal, self.device.updated());
         Some(journal.first_time(now).unwrap_or_else(|| journal.last_time(now)))
     }
 }

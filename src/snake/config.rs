@@ -1,5 +1,5 @@
 use super::model::{ACCELERATION, CURRENT, IDS, POSITION_MODE};
-use crate::motor::{MotorName, Reaction};
+use crate::motor::{Condition, HealthConfig, MotorName, Reaction};
 use crate::time::Duration;
 use crate::units::AngularVelocity;
 
@@ -37,6 +37,18 @@ pub(super) struct Stall {
 impl Stall {
     pub(super) const USUAL: Self =
         Self { window: Duration::from_secs(1), reaction: Reaction::Report };
+
+    /// The reactions of the joint.
+    pub(super) const fn health(&self) -> &'static HealthConfig {
+        const USUAL: HealthConfig = HealthConfig::new();
+        match self.reaction {
+            Reaction::Ignore => {
+                &const { USUAL.with_reaction(Condition::Stalled, Reaction::Ignore) }
+            }
+            Reaction::Report => &USUAL,
+            Reaction::Relax => &const { USUAL.with_reaction(Condition::Stalled, Reaction::Relax) },
+        }
+    }
 }
 
 impl Config {

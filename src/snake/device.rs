@@ -101,7 +101,7 @@ impl CanDevice for Joints {
     }
 
     fn emergency_stop(&mut self) {
-        if self.guard.stop() {
+        if self.guard.set_stop(true) {
             rest_all(self, Guard::emergency_stop);
             schedule::stop_all(self);
         }
@@ -109,7 +109,7 @@ impl CanDevice for Joints {
 
     fn clear_emergency_stop(&mut self) {
         self.slots.iter_mut().for_each(|slot| slot.guard.clear_emergency_stop());
-        self.guard.clear_stop();
+        self.guard.set_stop(false);
     }
 
     fn is_stopped(&self) -> bool {

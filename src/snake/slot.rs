@@ -235,11 +235,7 @@ impl Slot {
     #[inline]
     pub(super) fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
         self.guard.admit(is_finite)?;
-        if self.homing == Homing::Uncertain {
-            self.guard.relax();
-            return Err(TargetError::NotHomed);
-        }
-        Ok(())
+        self.guard.require_zero((self.homing != Homing::Uncertain).then_some(()))
     }
 
     /// Sets a target in pulses from the joint's zero.

@@ -15,7 +15,7 @@ fn found_with(file: &str, lines: &str) -> Vec<String> {
 }
 
 /// File, and a rule.
-const RULES: [(&str, &str); 43] = [
+const RULES: [(&str, &str); 45] = [
     // A motor trips by a flag.
     (
         "motor/actuator/update.rs",
@@ -28,6 +28,15 @@ const RULES: [(&str, &str); 43] = [
     (
         "snake/slot/health.rs",
         "fn f(slot: &mut Slot, is_wrong: bool) { if is_wrong { slot.guard.relax_until_armed() } }",
+    ),
+    // By the link, with and without a name for it.
+    (
+        "dji/slot/target.rs",
+        "fn f(slot: &mut Slot) { if slot.guard.link() != Link::Online { slot.asked = Action::Rest } }",
+    ),
+    (
+        "snake/slot.rs",
+        "fn f(slot: &mut Slot) { if matches!(slot.guard.link(), Link::Recovering) { slot.speed = 0 } }",
     ),
     // Ages of two statements, under other names, in a field, of a function, as an argument.
     (

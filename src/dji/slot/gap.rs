@@ -36,8 +36,8 @@ pub(in crate::dji) fn receive(
         // Before the first update no tick checks ages, so every frame must: all frames then take this path.
         let is_trusted = running && !slot.traffic.is_crowded();
         slot.guard.trust(if is_trusted { trusted_gap_us(facts) } else { 0 });
-        if link == Link::Recovering || link == Link::Offline {
-            health::begin_opening(slot);
+        if slot.guard.is_opening() {
+            health::narrow_further(slot, now);
         }
         health::waive_check(slot, facts);
     }
@@ -98,6 +98,7 @@ fn doubt_position(slot: &mut Slot) {
 pub(in crate::dji) fn set_present_position(
     slot: &mut Slot,
     position: Position,
+    now: u32,
 ) -> Result<(), TargetError> {
     if slot.guard.link() != Link::Online {
         return Err(TargetError::NoFeedback);
@@ -111,7 +112,7 @@ pub(in crate::dji) fn set_present_position(
     slot.shaft.set_position(position);
     slot.homing = Homing::Homed;
     slot.guard.latch_mut().set(Condition::PositionUncertain, false);
-    health::keep_inside(slot, 0);
+    health::narrow_further(slot, now);
     Ok(())
 }
 

@@ -99,7 +99,7 @@ pub(super) fn waive_check(slot: &mut Slot, facts: &Facts) {
 
 /// Begins a condition that is not ignored. A full check must end the condition.
 pub(in crate::dji) fn begin(slot: &mut Slot, condition: Condition) {
-    slot.guard.begin(condition, slot.health);
+    slot.guard.judge(condition, true, slot.health);
     slot.require_check();
 }
 
@@ -192,15 +192,28 @@ fn run_checks(slot: &mut Slot, facts: &Facts, seen: &Surroundings) -> f32 {
     slot.monitor.check(slot.guard.latch_mut(), &sample, slot.health)
 }
 
-/// Narrows the output to the available share, in the available directions.
+/// Narrows the output to what is available, of which the conditions leave a share.
 fn narrow(slot: &mut Slot, share: f32, elapsed: u8, now: u32) {
-    let share = share.min(slot.guard.share(now));
-    let limit = to_raw(share, f32::from(slot.full_limit), slot.full_limit);
-    slot.range = Range::within(limit);
-    keep_inside(slot, elapsed);
+    slot.range = available(slot, share, elapsed, now);
+    slot.apply_rules();
     if slot.range != Range::within(slot.full_limit) {
         hold_back(slot);
     }
+}
+
+/// Narrows the output further, where less is available than at the last check.
+pub(super) fn narrow_further(slot: &mut Slot, now: u32) {
+    slot.range = slot.range.and(available(slot, 1.0, 0, now));
+    slot.apply_rules();
+}
+
+/// Returns the available commands. `ahead` is the time to look ahead to a soft limit, in units of 1.024 ms.
+fn available(slot: &mut Slot, share: f32, ahead: u8, now: u32) -> Range {
+    let barred = soft_limits(slot, ahead);
+    let (lower, upper) = slot.guard.range(share, barred, now);
+    let word = |share: f32| to_raw(share.abs(), f32::from(slot.full_limit), slot.full_limit);
+    let (down, up) = (word(lower), word(upper));
+    if slot.raw_per_unit > 0.0 { Range::between(down, up) } else { Range::between(up, down) }
 }
 
 /// Keeps the integral of the speed loop within the available output: the loop knows only the full limit, and would wind up.
@@ -219,33 +232,10 @@ pub(in crate::dji) fn is_fit(slot: &Slot) -> bool {
 pub(in crate::dji) fn engage(slot: &mut Slot, now: u32) {
     slot.guard.engage(now);
     slot.monitor.start(slot.guard.latch_mut());
-    begin_opening(slot);
-    keep_inside(slot, 0);
+    narrow_further(slot, now);
 }
 
-/// Opens the output range from zero, unless the range opens at once.
-pub(super) fn begin_opening(slot: &mut Slot) {
-    if slot.guard.is_opening() {
-        slot.range = Range::ZERO;
-    }
-}
-
-/// Blocks the outward direction at a soft limit. `ahead` is the time to look ahead, in units of 1.024 ms.
-pub(super) fn keep_inside(slot: &mut Slot, ahead: u8) {
-    let (up_only, down_only) = soft_limits(slot, ahead);
-    let upward = slot.raw_per_unit > 0.0;
-    let (positive_only, negative_only) =
-        if upward { (up_only, down_only) } else { (down_only, up_only) };
-    if positive_only {
-        slot.range = slot.range.without_negative();
-    }
-    if negative_only {
-        slot.range = slot.range.without_positive();
-    }
-    slot.apply_rules();
-}
-
-/// Returns whether the shaft may turn up only, and whether the shaft may turn down only.
+/// Returns whether a soft limit bars the way downward, and whether one bars the way upward.
 fn soft_limits(slot: &mut Slot, ahead: u8) -> (bool, bool) {
     let Some((lower, upper)) = slot.health.soft_limits else { return (false, false) };
     if slot.homing == Homing::Relative {

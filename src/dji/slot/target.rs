@@ -5,7 +5,7 @@ use crate::control::Pid;
 use crate::dji::codec::{Range, saturate, to_raw};
 use crate::dji::outbox::Outbox;
 use crate::encoder::Position;
-use crate::motor::{Link, Rest, TargetError};
+use crate::motor::{Rest, TargetError};
 use crate::time::TimeStep;
 use crate::units::Angle;
 
@@ -102,10 +102,8 @@ impl Slot {
     ) -> Result<(), TargetError> {
         needs(self.has_position_loop())?;
         self.admit(angle.is_finite())?;
-        if !self.homing.is_known() {
-            self.relax();
-            return Err(TargetError::NotHomed);
-        }
+        let angle = self.homing.is_known().then_some(angle);
+        let angle = self.guard.require_zero(angle).map_err(|error| self.refuse(error))?;
         let (_, phase) = self.shaft.locate(angle);
         self.start(Action::Angle, Goal::of(phase), now);
         Ok(())
@@ -158,13 +156,12 @@ impl Slot {
         if !self.guard.has_target() {
             self.asked = Action::Rest;
         }
-        let is_online = self.guard.link() == Link::Online;
         if !self.guard.latch().active().is_empty() || self.guard.is_opening() {
             self.require_check();
         }
         let is_free = self.range == Range::within(self.full_limit) && self.speed.core.is_plain();
         self.duty = match self.asked {
-            _ if !is_online => Duty::Rest,
+            _ if !self.guard.drives() => Duty::Rest,
             Action::Rest => Duty::Rest,
             _ if self.has_rested() => Duty::First,
             _ if self.acted != self.asked => Duty::Other,

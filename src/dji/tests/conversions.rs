@@ -26,8 +26,8 @@ impl Case {
             limit,
             third,
             whole: Range::within(limit),
-            positive: narrow.without_negative(),
-            negative: narrow.without_positive(),
+            positive: narrow.and(Range::between(0, i16::MAX)),
+            negative: narrow.and(Range::between(i16::MAX, 0)),
         }
     }
 

@@ -144,7 +144,7 @@ impl<M: DriveProtocol> Actuator<M> {
             self.offered.may_repeat.end_without(self.guard.has_target());
         }
         self.guard.admit(!matches!(target, Err(TargetError::NotFinite)))?;
-        self.target = target.inspect_err(|_| self.guard.relax())?;
+        self.target = self.guard.require_zero(target.ok())?;
         Ok(())
     }
 }

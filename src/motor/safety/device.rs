@@ -27,7 +27,7 @@ pub(crate) struct DeviceGuard<const N: usize> {
     held_steps: u8,
     /// Stamp of the last command of another node.
     rival_heard: u32,
-    journal: Journal<N>,
+    pub(crate) journal: Journal<N>,
 }
 
 impl<const N: usize> DeviceGuard<N> {
@@ -59,12 +59,10 @@ impl<const N: usize> DeviceGuard<N> {
     pub(crate) fn stamp_of_measurement(&self, at: Instant) -> Option<u32> {
         let (now, measured_us) = (self.now, self.timeouts.measured_us());
         // A 32-bit stamp alone would be fresh again every 71 minutes.
-        if self.is_far(at) || !is_near(now, at.stamp(), measured_us) {
-            return None;
-        }
+        let is_fresh = !self.is_far(at) && is_near(now, at.stamp(), measured_us);
         let stamp = at.stamp().wrapping_add(measured_us).wrapping_sub(self.timeouts.command_us());
         // A stamp ahead has no age.
-        Some(if age(now, stamp) == 0 { now } else { stamp })
+        is_fresh.then_some(if age(now, stamp) == 0 { now } else { stamp })
     }
 
     /// Returns the stamp of new targets.
@@ -78,14 +76,6 @@ impl<const N: usize> DeviceGuard<N> {
 
     pub(crate) const fn is_running(&self) -> bool {
         self.is_running
-    }
-
-    pub(crate) const fn journal(&self) -> &Journal<N> {
-        &self.journal
-    }
-
-    pub(crate) const fn journal_mut(&mut self) -> &mut Journal<N> {
-        &mut self.journal
     }
 
     // Time.
@@ -240,10 +230,9 @@ impl<const N: usize> DeviceGuard<N> {
     fn hold(&mut self, before: Instant) -> Hold {
         self.is_running = true;
         self.disturb();
-        let (repeats, is_late) =
-            (self.held_steps == 0, self.updated.since(before) > self.timeouts.late());
+        let repeats = self.held_steps == 0 && self.updated.since(before) <= self.timeouts.late();
         self.held_steps = self.held_steps.saturating_add(1);
-        if repeats && !is_late { Hold::Keep } else { Hold::Rest }
+        if repeats { Hold::Keep } else { Hold::Rest }
     }
 
     /// Ends an update whose time did not move on: no age is known.
@@ -307,9 +296,11 @@ impl<const N: usize> DeviceGuard<N> {
         !motor.is_armed() && !self.misses(motor, now)
     }
 
-    /// Keeps the trip: another motor still waits to be armed.
-    pub(crate) const fn keep_trip(&mut self) {
-        self.gesture.keep();
+    /// Ends an arming: the trip goes on if a motor still waits to be armed.
+    pub(crate) fn end_arming<M: Guarded>(&mut self, motors: &mut [M]) {
+        if motors.iter_mut().any(|motor| motor.guard().is_tripped()) {
+            self.trip();
+        }
     }
 
     /// Begins the pause after a trip. Each update counts towards it.
@@ -318,19 +309,13 @@ impl<const N: usize> DeviceGuard<N> {
         self.wake_at(self.updated);
     }
 
-    /// Sets the emergency stop. Returns `false` if the stop is set already. The caller disarms the motors.
-    pub(crate) const fn stop(&mut self) -> bool {
-        if core::mem::replace(&mut self.is_stopped, true) {
-            return false;
-        }
-        self.trip();
-        true
-    }
-
-    pub(crate) const fn clear_stop(&mut self) {
-        if core::mem::replace(&mut self.is_stopped, false) {
+    /// Sets or clears the emergency stop; the caller disarms the motors. Returns `false` if nothing changes.
+    pub(crate) const fn set_stop(&mut self, is_stopped: bool) -> bool {
+        let changes = core::mem::replace(&mut self.is_stopped, is_stopped) != is_stopped;
+        if changes {
             self.trip();
         }
+        changes
     }
 
     pub(crate) const fn is_stopped(&self) -> bool {
@@ -377,11 +362,6 @@ impl Gesture {
         self.granted = !self.tripped || self.quiet_us >= Self::PAUSE_US;
         self.quiet_us = 0;
         self.granted
-    }
-
-    /// As [`DeviceGuard::keep_trip`].
-    const fn keep(&mut self) {
-        (self.tripped, self.granted) = (true, false);
     }
 
     /// Tells whether the device may be armed. If so, ends the trip.
@@ -452,12 +432,12 @@ mod tests {
     }
 
     #[test]
-    fn a_trip_that_is_kept_needs_a_pause_of_its_own() {
+    fn a_trip_after_an_arming_needs_a_pause_of_its_own() {
         let mut gesture = Gesture::NEW;
         gesture.trip();
         pass_ms(&mut gesture, 10, 10);
         assert!(gesture.ask() && gesture.take());
-        gesture.keep();
+        gesture.trip();
         pass_ms(&mut gesture, 10, 1);
         assert!(!gesture.take() && !gesture.ask());
         pass_ms(&mut gesture, 10, 10);

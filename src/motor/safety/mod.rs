@@ -10,7 +10,8 @@
 //! | is the feedback fresh? | `MotorGuard::age` | late: zero until the next feedback; offline: relaxed and latched |
 //! | is the motor armed, by a gesture? | `MotorGuard::admit`, `DeviceGuard::begin_arming` | no target is taken |
 //! | is there a target that is not expired? | `MotorGuard::age` | relaxed |
-//! | how far is the output range open? | `MotorGuard::share` | that share of the full command |
+//! | does a target from a zero have that zero? | `MotorGuard::require_zero` | relaxed, and the target is not taken |
+//! | how far is the output range open, and which of its directions? | `MotorGuard::range` | that share of the full command |
 //!
 //! The [health](super::HealthConfig) of a family finds faults, heat and a stall, and says what a second master does; each acts by
 //! [`MotorGuard::trip`]. [`DeviceGuard::is_alone`] says when a second master is gone. The tables of links and of arming, with all

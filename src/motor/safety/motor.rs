@@ -1,6 +1,7 @@
 //! Rules of one motor.
 
 use super::{Arming, LONGEST_PAUSE_US, Rest};
+use crate::math::limited;
 use crate::motor::{Condition, Latch, Link, TargetError, Timeouts, age, is_near};
 use crate::time::Duration;
 
@@ -108,7 +109,7 @@ impl MotorGuard {
     }
 
     /// Tells whether the motor was relaxed since arming, and waits to be armed again.
-    pub(crate) const fn is_tripped(&self) -> bool {
+    pub(super) const fn is_tripped(&self) -> bool {
         matches!(self.arming, Arming::Latched | Arming::Tripped)
     }
 
@@ -303,6 +304,20 @@ impl MotorGuard {
         }
     }
 
+    /// Refuses a target from a zero that is not known, which is `None`, and discards the target before.
+    pub(crate) fn require_zero<T>(&mut self, target: Option<T>) -> Result<T, TargetError> {
+        if target.is_none() {
+            self.relax();
+        }
+        target.ok_or(TargetError::NotHomed)
+    }
+
+    /// Tells whether a target may replace an earlier one: a motor with a target is armed.
+    #[inline]
+    pub(crate) fn may_renew_target(&self, is_finite: bool) -> bool {
+        self.link == Link::Online && is_finite
+    }
+
     /// Sets a target.
     pub(crate) const fn take_target(&mut self, now: u32) {
         self.has_target = true;
@@ -372,6 +387,14 @@ impl MotorGuard {
         self.is_opening &= passed < whole;
         if self.is_opening { passed as f32 / whole as f32 } else { 1.0 }
     }
+
+    /// Returns the ends of the available output, as shares of the full output from -1 to 1: the [open](Self::share) share, at most as much
+    /// as the conditions leave, and zero downward or upward where that way is barred.
+    pub(crate) fn range(&mut self, left: f32, barred: (bool, bool), now: u32) -> (f32, f32) {
+        let most = limited(left, 0.0, self.share(now));
+        let end = |is_barred| if is_barred { 0.0 } else { most };
+        (-end(barred.0), end(barred.1))
+    }
 }
 
 #[cfg(test)]
@@ -399,6 +422,24 @@ mod tests {
         let mut at_once = MotorGuard::NEW.with(Duration::ZERO, false);
         at_once.open(at_ms(1));
         assert_eq!(at_once.share(at_ms(1)).to_bits(), 1.0_f32.to_bits());
+    }
+
+    /// Law: no end is further out than what is open or what the conditions leave, and the end of a way that is barred is zero.
+    #[test]
+    fn the_range_has_the_smaller_share_toward_each_way_that_is_not_barred() {
+        let mut motor = MotorGuard::NEW.with(OPENING, false);
+        motor.open(0);
+        for (now_ms, left, most) in
+            [(50, 1.0, 0.25), (100, 0.3, 0.3), (150, 0.0, 0.0), (200, 0.7, 0.7)]
+        {
+            let ends = [(false, false), (true, false), (false, true), (true, true)]
+                .map(|barred| motor.range(left, barred, 1_000 * now_ms));
+            assert_eq!(
+                ends,
+                [(-most, most), (-0.0, most), (-most, 0.0), (-0.0, 0.0)],
+                "{now_ms} ms"
+            );
+        }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::{ALL, JUMP, LAST, Slot, Standing};
 use crate::encoder::{Homing, Position};
-use crate::motor::{self, Condition, Health, Link, MotorName, Reaction, Traffic};
+use crate::motor::{self, Condition, Health, Link, MotorName, Traffic};
 use crate::snake::model::PULSES_PER_TURN;
 use crate::snake::{Register, State};
 use crate::time::{Duration, Edge, Instant};
@@ -31,8 +31,7 @@ impl Slot {
             }
             _ => {}
         }
-        if self.question == Some(register) {
-            self.question = None;
+        if self.question.take_if(|question| *question == register).is_some() {
             self.answer = Some((register, value));
         }
     }
@@ -65,9 +64,8 @@ impl Slot {
 
     /// Handles a drive in an unexpected state: its zero may differ, so the joint stays relaxed until armed again.
     fn distrust(&mut self, now: Instant) {
-        self.guard.note(Condition::Fault, true, now);
+        self.guard.change(now, |motor| motor.judge(Condition::Fault, true, self.stall.health()));
         self.lose_zero(now);
-        self.guard.trip();
     }
 
     fn lose_zero(&mut self, now: Instant) {
@@ -151,10 +149,8 @@ fn check(slot: &mut Slot, is_stalled: bool, now: Instant) {
     if slot.guard.link() == Link::Offline {
         slot.lose_zero(now);
     }
-    if is_stalled && slot.stall.reaction == Reaction::Relax {
-        slot.guard.relax_until_armed();
-    }
-    slot.guard.note(Condition::Stalled, is_stalled, now);
+    slot.guard
+        .change(now, |motor| motor.judge(Condition::Stalled, is_stalled, slot.stall.health()));
     if slot.driven && slot.is_forgotten(now) {
         slot.renew(Register::Position);
     }
@@ -170,9 +166,8 @@ fn is_stalled(slot: &mut Slot, now: Instant) -> bool {
     let Some(raw) = slot.raw else { return false };
     let way = slot.target.wrapping_sub(raw).unsigned_abs();
     let moved = raw.wrapping_sub(slot.stands.at).unsigned_abs() > STANDS;
-    let asked = is_up(slot) && way > THERE;
-    let is_watched = slot.stall.reaction != Reaction::Ignore && slot.guard.link() == Link::Online;
-    if moved || !(asked && is_watched && is_fast_enough(slot)) {
+    let asked = is_up(slot) && way > THERE && slot.guard.link() == Link::Online;
+    if moved || !(asked && is_fast_enough(slot)) {
         slot.stands = Standing { at: raw, since: now };
     }
     now.since(slot.stands.since) >= slot.stall.window
