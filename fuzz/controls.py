@@ -126,7 +126,7 @@ DEFECTS = [
     ("snake", "a write given back goes before others", "src/snake/slot.rs",
      "self.ahead |= self.renew", "self.ahead = self.renew"),
     ("snake", "without a step, late, it moves on", "src/motor/safety/device.rs",
-     "if repeats && !is_late", "if repeats && (!is_late || true)"),
+     "self.held_steps == 0 && self.updated.since(before) <= self.timeouts.late();", "self.held_steps == 0;"),
     ("snake", "without a step no disable is sent again", "src/snake/bus.rs",
      "}\n        schedule::stop_again(self);\n", "}\n"),
     ("snake", "without a step an answer is waited for for ever", "src/snake/bus.rs",
