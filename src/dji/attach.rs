@@ -152,7 +152,7 @@ pub(super) fn is_armed(slots: &[Slot]) -> bool {
 
 /// Returns a command of one of these motors that another node has sent.
 pub(super) fn rival_among<'a>(mut slots: impl Iterator<Item = &'a Slot>) -> Option<Claim> {
-    let slot = slots.find(|slot| slot.guard.latch().has(Condition::SecondMaster))?;
+    let slot = slots.find(|slot| slot.guard.latch.has(Condition::SecondMaster))?;
     claim(slot.place.frame().id(), Claim::command, slot.name()?)
 }
 

@@ -61,7 +61,7 @@ impl<B, const N: usize> Bus<B, N> {
     pub fn conditions(&self, motor: impl Into<AnyHandle<B>>) -> Conditions {
         self.motors
             .get(motor.into().key())
-            .map_or(Conditions::NONE, |slot| slot.guard.latch().active())
+            .map_or(Conditions::NONE, |slot| slot.guard.latch.active())
     }
 
     /// Returns the oldest unread edge of a motor.

@@ -171,27 +171,10 @@ fn hear_command<const N: usize>(motors: &mut Motors<N>, outbox: &Outbox, id: u32
 pub(super) fn take_edge<const N: usize>(
     motors: &mut Motors<N>,
 ) -> Option<Edge<Condition, MotorName>> {
-    let updated = motors.guard.updated();
-    while let Some(entry) = motors.guard.journal.pop() {
-        let at = motors.guard.journal.time_of(&entry, updated);
-        let Some(slot) = motors.slots.get_mut(usize::from(entry.motor)) else { continue };
-        let Some(motor) = slot.name() else { continue };
-        let (condition, began) = (entry.condition, entry.began);
-        if slot.guard.latch_mut().take(condition, began) {
-            return Some(Edge { source: motor, condition, began, at });
-        }
-    }
-    let at = motors.guard.journal.last_time(updated);
-    let edge = motors.slots.iter_mut().find_map(|slot| {
-        let motor = slot.name()?;
-        let (condition, began) = slot.guard.latch().next()?;
-        slot.guard.latch_mut().take(condition, began);
-        Some(Edge { source: motor, condition, began, at })
-    });
-    if edge.is_none() {
-        motors.guard.journal.clear();
-    }
-    edge
+    let (guard, slots) = motors.parts();
+    let Edge { source, condition, began, at } = guard.journal.next_edge(slots, guard.updated())?;
+    let source = slots.get(usize::from(source))?.name()?;
+    Some(Edge { source, condition, began, at })
 }
 
 /// Counters of a bus. All saturate, except `packed` and `superseded`, which wrap at 2^32.

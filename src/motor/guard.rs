@@ -118,7 +118,7 @@ impl Guard {
     /// Notes that the angle counts from an unknown zero, and [trips](Self::relax_until_armed).
     pub(crate) fn lose_zero(&mut self, now: Instant) {
         self.change(now, |motor| {
-            motor.latch_mut().set(Condition::PositionUncertain, true);
+            motor.latch.set(Condition::PositionUncertain, true);
             motor.trip();
         });
     }
@@ -126,7 +126,7 @@ impl Guard {
     /// Notes a command of the motor by another node.
     pub(super) fn hear_rival(&mut self, now: Instant) {
         self.device.hear_rival(now.stamp());
-        self.change(now, |motor| motor.latch_mut().set(Condition::SecondMaster, true));
+        self.change(now, |motor| motor.latch.set(Condition::SecondMaster, true));
         self.device.wake_at(self.device.updated());
     }
 
@@ -178,11 +178,11 @@ impl Guard {
         }
         // The range of a motor that is not driven must be open before its stamp repeats.
         self.motor.share(now.stamp());
-        if !self.motor.latch().active().is_empty() {
+        if !self.motor.latch.active().is_empty() {
             let is_alone = self.device.is_alone();
             self.change(now, |motor| motor.end_what_is_over(is_alone));
         }
-        if self.motor.latch().has(Condition::SecondMaster) {
+        if self.motor.latch.has(Condition::SecondMaster) {
             self.device.wake_at(now);
         }
         true
@@ -201,7 +201,7 @@ impl Guard {
     /// Tells whether the time of the last update moved on. If not, the length of nothing that lasts until now is known.
     #[cfg(feature = "hal")]
     pub(crate) const fn knows_time(&self) -> bool {
-        !self.motor.latch().has(Condition::ClockFault)
+        !self.motor.latch.has(Condition::ClockFault)
     }
 
     /// Handles a time that did not move on, so that no age is known. Feedback counts as late until the next frame, and the motor trips.
@@ -383,14 +383,14 @@ impl Guard {
 impl MotorGuard {
     /// Sets whether a condition holds that is not ignored, and takes its consequences.
     pub(crate) fn judge(&mut self, condition: Condition, holds: bool, config: &HealthConfig) {
-        let before = self.latch().active();
-        self.latch_mut().set(condition, holds && !config.ignores(condition));
+        let before = self.latch.active();
+        self.latch.set(condition, holds && !config.ignores(condition));
         self.react(before, config);
     }
 
     /// Trips the motor if a condition that began since `before` demands rest, or the motor must not be armed.
     pub(crate) const fn react(&mut self, before: Conditions, config: &HealthConfig) {
-        if config.relaxes(before, self.latch().active()) {
+        if config.relaxes(before, self.latch.active()) {
             self.trip();
         }
     }
@@ -499,6 +499,14 @@ mod tests {
         assert!(guard.ask() && guard.engage(at_ms(239)));
         assert_eq!(guard.admit(true), Ok(()));
         assert!(guard.drives(at_ms(240)));
+    }
+
+    #[test]
+    fn a_motor_that_was_relaxed_takes_no_target_until_armed_again() {
+        let mut guard = driving();
+        guard.relax_until_armed();
+        assert_eq!((guard.has_target(), guard.admit(true)), (false, Err(TargetError::Relaxed)));
+        assert!(!guard.ask() && !guard.engage(at_ms(2)));
     }
 
     #[test]

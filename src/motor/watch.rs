@@ -333,13 +333,13 @@ impl Guard {
         now: Instant,
         change: impl FnOnce(&mut Latch) -> T,
     ) -> T {
-        self.change(now, |motor| change(motor.latch_mut()))
+        self.change(now, |motor| change(&mut motor.latch))
     }
 
     /// Returns the conditions of the motor that hold.
     #[must_use]
     pub const fn conditions(&self) -> Conditions {
-        self.motor.latch().active()
+        self.motor.latch.active()
     }
 
     /// Returns the oldest unread edge, with the name passed as `motor`: the guard has no name of its motor.
@@ -359,17 +359,9 @@ impl Guard {
     /// # Ok::<(), &str>(())
     /// ```
     pub fn next_edge(&mut self, motor: MotorName) -> Option<Edge<Condition, MotorName>> {
-        let now = self.device.updated();
-        while let Some(entry) = self.device.journal.pop() {
-            if self.motor.latch_mut().take(entry.condition, entry.began) {
-                let at = self.device.journal.time_of(&entry, now);
-                let (condition, began) = (entry.condition, entry.began);
-                return Some(Edge { source: motor, condition, began, at });
-            }
-        }
-        let (condition, began) = self.motor.latch().next()?;
-        self.motor.latch_mut().take(condition, began);
-        Some(Edge { source: motor, condition, began, at: self.device.journal.last_time(now) })
+        let (motors, now) = (core::slice::from_mut(&mut self.motor), self.device.updated());
+        let Edge { condition, began, at, .. } = self.device.journal.next_edge(motors, now)?;
+        Some(Edge { source: motor, condition, began, at })
     }
 
     /// Returns the part of a motor's health that the guard holds.
@@ -392,7 +384,7 @@ impl Guard {
 
     /// Returns the time of the edge that [`next_edge`](Self::next_edge) returns next: to read several motors in order.
     pub(crate) fn next_edge_at(&self) -> Option<Instant> {
-        self.motor.latch().next()?;
+        self.motor.latch.next()?;
         let (journal, now) = (self.device.journal, self.device.updated());
         Some(journal.first_time(now).unwrap_or_else(|| journal.last_time(now)))
     }

@@ -87,7 +87,7 @@ fn move_shortest(slot: &mut Slot, feedback: Feedback) {
 
 fn doubt_position(slot: &mut Slot) {
     slot.ambiguous_gaps = slot.ambiguous_gaps.saturating_add(1);
-    slot.guard.latch_mut().set(Condition::PositionUncertain, true);
+    slot.guard.latch.set(Condition::PositionUncertain, true);
     slot.require_check();
     if slot.homing == Homing::Homed && !slot.shaft.is_direct() {
         slot.homing = Homing::Uncertain;
@@ -111,7 +111,7 @@ pub(in crate::dji) fn set_present_position(
     }
     slot.shaft.set_position(position);
     slot.homing = Homing::Homed;
-    slot.guard.latch_mut().set(Condition::PositionUncertain, false);
+    slot.guard.latch.set(Condition::PositionUncertain, false);
     health::narrow_further(slot, now);
     Ok(())
 }

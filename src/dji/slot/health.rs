@@ -83,7 +83,7 @@ impl CheckRound {
 /// Allows quick checks from now on, if all is well.
 #[inline(never)]
 pub(super) fn waive_check(slot: &mut Slot, facts: &Facts) {
-    let is_well = slot.guard.latch().active().is_empty()
+    let is_well = slot.guard.latch.active().is_empty()
         && slot.guard.link() == Link::Online
         && !slot.guard.is_opening()
         && slot.error_code == 0
@@ -106,7 +106,7 @@ pub(in crate::dji) fn begin(slot: &mut Slot, condition: Condition) {
 /// Runs all checks that do not run in every tick.
 pub(in crate::dji) fn check(slot: &mut Slot, seen: &Surroundings) {
     let Some(facts) = slot.facts else { return };
-    let before = slot.guard.latch().active();
+    let before = slot.guard.latch.active();
     if let Some(window) = seen.window {
         close_window(slot, window, seen.feedback_hz);
     }
@@ -119,7 +119,7 @@ pub(in crate::dji) fn check(slot: &mut Slot, seen: &Surroundings) {
     } else {
         slot.monitor = Monitor::NEW;
     }
-    if !slot.guard.latch().active().is_empty() || slot.error_code != 0 {
+    if !slot.guard.latch.active().is_empty() || slot.error_code != 0 {
         slot.require_check();
         slot.guard.react(before, slot.health);
     } else if slot.cool_below == 0 {
@@ -135,7 +135,7 @@ pub(in crate::dji) fn hear_error(slot: &mut Slot, facts: &Facts, code: u8) {
     }
     slot.monitor.hear_error();
     if is_graver(slot, facts, code) {
-        let before = slot.guard.latch().active();
+        let before = slot.guard.latch.active();
         take_error(slot, facts, code);
         slot.require_check();
         slot.guard.react(before, slot.health);
@@ -161,7 +161,7 @@ fn is_graver(slot: &Slot, facts: &Facts, code: u8) -> bool {
 fn take_error(slot: &mut Slot, facts: &Facts, code: u8) {
     if code != slot.error_code {
         slot.error_code = code;
-        slot.guard.latch_mut().report(facts.errors.severity(code), true, slot.health);
+        slot.guard.latch.report(facts.errors.severity(code), true, slot.health);
     }
 }
 
@@ -189,7 +189,7 @@ fn run_checks(slot: &mut Slot, facts: &Facts, seen: &Surroundings) -> f32 {
             .has_temperature
             .then(|| (celsius(feedback.temperature()), temperatures(facts, slot.health))),
     };
-    slot.monitor.check(slot.guard.latch_mut(), &sample, slot.health)
+    slot.monitor.check(&mut slot.guard.latch, &sample, slot.health)
 }
 
 /// Narrows the output to what is available, of which the conditions leave a share.
@@ -231,7 +231,7 @@ pub(in crate::dji) fn is_fit(slot: &Slot) -> bool {
 /// Takes targets from now on, beginning at rest. A condition that relaxed the motor is detected anew.
 pub(in crate::dji) fn engage(slot: &mut Slot, now: u32) {
     slot.guard.engage(now);
-    slot.monitor.start(slot.guard.latch_mut());
+    slot.monitor.start(&mut slot.guard.latch);
     narrow_further(slot, now);
 }
 
@@ -239,13 +239,13 @@ pub(in crate::dji) fn engage(slot: &mut Slot, now: u32) {
 fn soft_limits(slot: &mut Slot, ahead: u8) -> (bool, bool) {
     let Some((lower, upper)) = slot.health.soft_limits else { return (false, false) };
     if slot.homing == Homing::Relative {
-        slot.guard.latch_mut().set(Condition::SoftLimit, false);
+        slot.guard.latch.set(Condition::SoftLimit, false);
         return (false, false);
     }
     let here = slot.shaft.position().as_angle().as_radians();
     // The position at the next check.
     let there = here + slot.velocity().as_rad_per_s() * (f32::from(ahead) * 1.024e-3);
-    check_soft_limits(slot.guard.latch_mut(), (lower, upper), here, there)
+    check_soft_limits(&mut slot.guard.latch, (lower, upper), here, there)
 }
 
 fn close_window(slot: &mut Slot, window: u16, feedback_hz: u32) {
@@ -258,7 +258,7 @@ fn close_window(slot: &mut Slot, window: u16, feedback_hz: u32) {
         slot.guard.trust(0);
     }
     if was_crowded && !double {
-        slot.guard.latch_mut().set(Condition::DuplicateId, false);
+        slot.guard.latch.set(Condition::DuplicateId, false);
     }
 }
 
@@ -286,7 +286,7 @@ pub(in crate::dji) fn state(slot: &Slot) -> Option<State> {
         ambiguous_gaps: slot.ambiguous_gaps,
         refused_targets: slot.guard.refused_targets(),
         forgotten_targets: slot.guard.forgotten_targets(),
-        conditions: slot.guard.latch().active(),
+        conditions: slot.guard.latch.active(),
         link: slot.guard.link(),
         feedback: slot.feedback,
     })
@@ -301,7 +301,7 @@ pub(in crate::dji) fn report(slot: &Slot) -> Option<Health> {
         motor: slot.name()?,
         link: slot.guard.link(),
         armed: slot.guard.is_armed(),
-        conditions: slot.guard.latch().active(),
+        conditions: slot.guard.latch.active(),
         feedback_hz: slot.traffic.rate_hz(),
         longest_gap: Duration::from_micros(slot.traffic.longest_gap_us().into()),
         temperature_c: (heard && facts.has_temperature).then_some(celsius),
@@ -315,7 +315,7 @@ pub(in crate::dji) fn report(slot: &Slot) -> Option<Health> {
 
 /// Returns a motor that must not be armed, with its conditions.
 pub(in crate::dji) fn unfit(slot: &Slot) -> Option<(MotorName, Conditions)> {
-    let conditions = slot.guard.latch().active();
+    let conditions = slot.guard.latch.active();
     Some((slot.name()?, conditions)).filter(|_| slot.health.forbids(conditions))
 }
 

@@ -122,9 +122,8 @@ impl Slot {
         let Some(stamp) = stamp else {
             if self.guard.has_target() {
                 self.guard.forget_target();
-                self.apply_rules();
             }
-            return Err(TargetError::StaleMeasurement);
+            return Err(self.refuse(TargetError::StaleMeasurement));
         };
         self.start(Action::Measured, Goal::measured(way, rad_per_s), stamp);
         Ok(())
@@ -156,13 +155,12 @@ impl Slot {
         if !self.guard.has_target() {
             self.asked = Action::Rest;
         }
-        if !self.guard.latch().active().is_empty() || self.guard.is_opening() {
+        if !self.guard.latch.active().is_empty() || self.guard.is_opening() {
             self.require_check();
         }
         let is_free = self.range == Range::within(self.full_limit) && self.speed.core.is_plain();
         self.duty = match self.asked {
             _ if !self.guard.drives() => Duty::Rest,
-            Action::Rest => Duty::Rest,
             _ if self.has_rested() => Duty::First,
             _ if self.acted != self.asked => Duty::Other,
             Action::Raw => Duty::Raw,

@@ -81,6 +81,11 @@ impl Latch {
     }
 }
 
+/// A motor with conditions.
+pub(crate) trait Latched {
+    fn latch(&mut self) -> &mut Latch;
+}
+
 /// Times of the unread changes in the order of detection, as long as there is room.
 ///
 /// A change without room stays latched: only its time is lost.
@@ -146,13 +151,31 @@ impl<const N: usize> Journal<N> {
         self.length == 0 && !self.is_overfull
     }
 
-    /// Notes that all changes are read, those without an entry too.
-    pub(crate) const fn clear(&mut self) {
+    /// Takes the oldest unread change of the motors, which is an edge, with the place of its motor.
+    pub(crate) fn next_edge<M: Latched>(
+        &mut self,
+        motors: &mut [M],
+        now: Instant,
+    ) -> Option<Edge<Condition, u8>> {
+        while let Some(Entry { motor: source, condition, began, at }) = self.pop() {
+            let motor = motors.get_mut(usize::from(source));
+            if motor.is_some_and(|motor| motor.latch().take(condition, began)) {
+                return Some(Edge { source, condition, began, at: fine(at, now) });
+            }
+        }
+        let at = self.last_time(now);
+        for (source, motor) in (0..).zip(motors) {
+            if let Some((condition, began)) = motor.latch().next() {
+                motor.latch().take(condition, began);
+                return Some(Edge { source, condition, began, at });
+            }
+        }
         self.is_overfull = false;
+        None
     }
 
     /// Takes the oldest entry.
-    pub(crate) fn pop(&mut self) -> Option<Entry> {
+    fn pop(&mut self) -> Option<Entry> {
         if self.length == 0 {
             return None;
         }
@@ -180,11 +203,6 @@ impl<const N: usize> Journal<N> {
         }
     }
 
-    /// Returns the time of an entry, seen from a `now` that may lie a little before the entry: exact to 1.024 ms, up to an age of 25 days.
-    pub(crate) fn time_of(&self, entry: &Entry, now: Instant) -> Instant {
-        fine(entry.at, now)
-    }
-
     /// Returns the time of the last entry: changes without an entry came later.
     pub(crate) fn last_time(&self, now: Instant) -> Instant {
         fine(self.last, now)
@@ -203,6 +221,7 @@ const fn coarse(now: Instant) -> u32 {
     (now.as_micros() >> 10) as u32
 }
 
+/// Returns a time, seen from a `now` that may lie a little before it: exact to 1.024 ms, up to an age of 25 days.
 fn fine(at: u32, now: Instant) -> Instant {
     let age = i64::from(coarse(now).wrapping_sub(at).cast_signed()) << 10;
     let rounded = now.as_micros() & !1023;
@@ -262,8 +281,7 @@ mod tests {
             let entry = journal.pop().unwrap();
             assert_eq!((entry.motor, entry.began), (7, true));
             assert_eq!(entry.condition, expected);
-            let off = Instant::from_micros(1_000_000 + millis * 10_000)
-                .since(journal.time_of(&entry, NOW));
+            let off = Instant::from_micros(1_000_000 + millis * 10_000).since(fine(entry.at, NOW));
             assert!(off < Duration::from_micros(1_024));
         }
         assert_eq!(journal.pop(), None);
@@ -282,7 +300,7 @@ mod tests {
         for later in
             [start + Duration::from_secs(24 * 86_400), Instant::from_micros((1 << 40) - 900)]
         {
-            assert_eq!(journal.time_of(&entry, later), start);
+            assert_eq!(fine(entry.at, later), start);
         }
     }
 

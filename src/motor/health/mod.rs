@@ -32,7 +32,7 @@ use super::{Link, MotorName};
 use crate::time::Duration;
 
 pub use config::{HealthConfig, Reaction};
-pub(crate) use edge::{Journal, Latch};
+pub(crate) use edge::{Journal, Latch, Latched};
 pub(crate) use monitor::{Monitor, Sample, check_soft_limits, elapsed};
 pub(crate) use traffic::{Answers, Traffic};
 

@@ -202,10 +202,10 @@ impl<const N: usize> DeviceGuard<N> {
         now: Instant,
         change: impl FnOnce(&mut M) -> T,
     ) -> T {
-        let (latch, was_armed) = (*motor.guard().latch(), motor.guard().is_armed());
+        let (latch, was_armed) = (motor.guard().latch, motor.guard().is_armed());
         let outcome = change(motor);
         motor.follow();
-        self.journal.note(index, &latch, motor.guard().latch(), now);
+        self.journal.note(index, &latch, &motor.guard().latch, now);
         if was_armed && !motor.guard().is_armed() {
             self.trip();
         }

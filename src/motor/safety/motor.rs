@@ -2,7 +2,7 @@
 
 use super::{Arming, LONGEST_PAUSE_US, Rest};
 use crate::math::limited;
-use crate::motor::{Condition, Latch, Link, TargetError, Timeouts, age, is_near};
+use crate::motor::{Condition, Latch, Latched, Link, TargetError, Timeouts, age, is_near};
 use crate::time::Duration;
 
 /// Counts up to 32 767, or 4 s of a bus full of frames of one motor. The count is taken each second. Each overflow would lengthen the gap
@@ -38,7 +38,7 @@ pub(crate) struct MotorGuard {
     resumes: bool,
     refused_targets: u16,
     forgotten_targets: u16,
-    latch: Latch,
+    pub(crate) latch: Latch,
 }
 
 /// A motor of a device, under the rules of its guard.
@@ -47,6 +47,12 @@ pub(crate) trait Guarded {
 
     /// Takes the consequences of a change of the guard.
     fn follow(&mut self) {}
+}
+
+impl<M: Guarded> Latched for M {
+    fn latch(&mut self) -> &mut Latch {
+        &mut self.guard().latch
+    }
 }
 
 impl Guarded for MotorGuard {
@@ -128,14 +134,6 @@ impl MotorGuard {
 
     pub(crate) const fn forgotten_targets(&self) -> u16 {
         self.forgotten_targets
-    }
-
-    pub(crate) const fn latch(&self) -> &Latch {
-        &self.latch
-    }
-
-    pub(crate) const fn latch_mut(&mut self) -> &mut Latch {
-        &mut self.latch
     }
 
     /// Tells whether the feedback is not fresh.
@@ -372,7 +370,7 @@ impl MotorGuard {
 
     /// Opens the output range from zero.
     pub(crate) const fn open(&mut self, now: u32) {
-        self.is_opening = self.opening_ms > 0;
+        self.is_opening = true;
         self.opened = now;
     }
 
