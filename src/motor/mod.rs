@@ -45,7 +45,7 @@
 //!
 //! The arming decides whether the motor takes targets: only an armed motor does.
 //!
-//! | arming | a granted request to arm | offline | a fault, lost time | disarm, emergency stop |
+//! | arming | a granted request to arm | offline | a fault, lost time, a lost zero | disarm, emergency stop |
 //! |---|---|---|---|---|
 //! | disarmed | armed | | | |
 //! | armed | | latched | tripped | disarmed |
@@ -53,8 +53,8 @@
 //! | tripped | armed | | | disarmed |
 //!
 //! A latched and a tripped motor differ in one thing: if [`with_resume`](crate::dji::Config::with_resume) is configured, a latched motor
-//! takes targets again by itself when online. Each latch, each trip and the emergency stop begin the pause of the gesture: a request to arm
-//! is granted after 100 ms without a request. Disarming begins no pause.
+//! takes targets again by itself when online. Each latch, each trip, and the emergency stop when set and when cleared, begin the pause of the gesture: a
+//! request to arm is granted after 100 ms without a request. Disarming begins no pause.
 
 mod actuator;
 mod arming;

@@ -385,7 +385,7 @@ impl Guard {
     /// Returns the time of the edge that [`next_edge`](Self::next_edge) returns next: to read several motors in order.
     pub(crate) fn next_edge_at(&self) -> Option<Instant> {
         self.motor.latch.next()?;
-        let (journal, now) = (self.device.journal, self.device.updated());
+        let (journal, now) = (&self.device.journal, self.device.updated());
         Some(journal.first_time(now).unwrap_or_else(|| journal.last_time(now)))
     }
 }

@@ -41,12 +41,11 @@ impl Joints {
     /// set before arming, and does not keep a target alive.
     ///
     /// # Errors
-    /// The joint is detached, or the speed is NaN or infinite, which also cancels the present target.
+    /// The joint is detached, or the speed is NaN or infinite, which counts as a refused target and cancels the present one.
     pub fn set_speed(&mut self, joint: Joint, speed: AngularVelocity) -> Result<(), TargetError> {
         let slot = self.slot_mut(joint).ok_or(TargetError::Detached)?;
         if !speed.is_finite() {
-            self.relax(joint);
-            return Err(TargetError::NotFinite);
+            return self.aim(joint, false, |_| {});
         }
         slot.set_speed(speed.as_rad_per_s());
         Ok(())

@@ -15,7 +15,7 @@ fn found_with(file: &str, lines: &str) -> Vec<String> {
 }
 
 /// File, and a rule.
-const RULES: [(&str, &str); 45] = [
+const RULES: [(&str, &str); 46] = [
     // A motor trips by a flag.
     (
         "motor/actuator/update.rs",
@@ -28,6 +28,10 @@ const RULES: [(&str, &str); 45] = [
     (
         "snake/slot/health.rs",
         "fn f(slot: &mut Slot, is_wrong: bool) { if is_wrong { slot.guard.relax_until_armed() } }",
+    ),
+    (
+        "snake/slot.rs",
+        "impl Slot { fn f(&mut self, now: Instant) { self.guard.change(now, |motor| motor.trip()); } }",
     ),
     // By the link, with and without a name for it.
     (

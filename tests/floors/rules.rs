@@ -1,5 +1,5 @@
-//! No family has a line of its own for the rules of the safety core: link, arming and its gesture, command deadline, latches, edges,
-//! second master, ramp, and the order of refusals.
+//! A family asks the safety core for its rules: link, arming and its gesture, command deadline, edges, second master, opening, and the
+//! order of refusals. What shape alone shows of a rule elsewhere is found here; whether a family asks in the right order is not.
 //!
 //! * A protocol (`damiao`, `lk`, `odrive`, `rmd`, `robstride`, `vesc`) has no clock: it may name a short list of `motor` and `control`, of
 //!   `time` a duration for a setting of its drive, and declares few types beside those that it shows.
@@ -179,13 +179,33 @@ const COUNTS: [(&str, &str, &[&str]); 24] = [
     ),
 ];
 
+/// The functions by which a motor trips, and those that judge a condition.
+const TRIPPING: [&str; 6] =
+    ["trip", "relax_until_armed", "lose_zero", "lose_time", "judge", "react"];
+
 /// Calls by which a motor trips, by file: how many, and why.
-const TRIPS: [(&str, usize, &str); 5] = [
+const TRIPS: [(&str, usize, &str); 9] = [
     ("dji/device.rs", 1, "the runner trips all motors"),
+    (
+        "dji/slot/health.rs",
+        3,
+        "an error, a second master, two motors with one id, a check: as the configuration says",
+    ),
     ("motor/actuator/device.rs", 1, "the runner trips the motor"),
-    ("motor/actuator/update.rs", 1, "the drive started again, or has a wrong setting"),
-    ("motor/actuator/update.rs", 1, "the joint lost its zero"),
-    ("snake/slot/health.rs", 1, "the same, of a joint"),
+    ("motor/actuator/joint.rs", 3, "no trip: the joint has no zero from now on"),
+    (
+        "motor/actuator/update.rs",
+        2,
+        "the joint lost its zero; the drive started again, or has a wrong setting",
+    ),
+    ("snake/bus.rs", 1, "time did not move on"),
+    ("snake/device.rs", 1, "the runner trips all joints"),
+    ("snake/slot/health.rs", 4, "the joint lost its zero: in a silence, offline, by its drive"),
+    (
+        "snake/slot/health.rs",
+        2,
+        "a drive in an unexpected state, a stall: as the configuration says",
+    ),
 ];
 
 /// Where a family asks for the state of the link, by file: how many times, and for what. The core alone says what follows for the drive.
@@ -415,9 +435,10 @@ fn findings(folder: &str, files: &Files, used: &mut BTreeSet<String>) -> Vec<Str
         if text.contains("is_hold()") && !asks {
             found.push(format!("{file} has its own rule for a held update"));
         }
-        let trips = tokens.windows(4).filter(|call| {
-            let is_call = call[0] == "guard" && call[1] == "." && call[3] == "(";
-            is_call && ["trip", "relax_until_armed", "lose_zero"].contains(&call[2].as_str())
+        let trips = tokens.windows(3).filter(|call| {
+            let is_call = [".", "::"].contains(&call[0].as_str())
+                && [",", "(", ")"].contains(&call[2].as_str());
+            is_call && TRIPPING.contains(&call[1].as_str())
         });
         let (trips, rows) = (trips.count(), TRIPS.iter().filter(|(name, ..)| name == file));
         if trips != rows.map(|(_, trips, _)| trips).sum() {

@@ -37,7 +37,7 @@ pub(in crate::dji) fn receive(
         let is_trusted = running && !slot.traffic.is_crowded();
         slot.guard.trust(if is_trusted { trusted_gap_us(facts) } else { 0 });
         if slot.guard.is_opening() {
-            health::narrow_further(slot, now);
+            health::narrow_further(slot, (false, false), now);
         }
         health::waive_check(slot, facts);
     }
@@ -112,7 +112,7 @@ pub(in crate::dji) fn set_present_position(
     slot.shaft.set_position(position);
     slot.homing = Homing::Homed;
     slot.guard.latch.set(Condition::PositionUncertain, false);
-    health::narrow_further(slot, now);
+    health::keep_inside(slot, now);
     Ok(())
 }
 

@@ -194,7 +194,8 @@ fn run_checks(slot: &mut Slot, facts: &Facts, seen: &Surroundings) -> f32 {
 
 /// Narrows the output to what is available, of which the conditions leave a share.
 fn narrow(slot: &mut Slot, share: f32, elapsed: u8, now: u32) {
-    slot.range = available(slot, share, elapsed, now);
+    let barred = soft_limits(slot, elapsed);
+    slot.range = available(slot, share, barred, now);
     slot.apply_rules();
     if slot.range != Range::within(slot.full_limit) {
         hold_back(slot);
@@ -202,14 +203,19 @@ fn narrow(slot: &mut Slot, share: f32, elapsed: u8, now: u32) {
 }
 
 /// Narrows the output further, where less is available than at the last check.
-pub(super) fn narrow_further(slot: &mut Slot, now: u32) {
-    slot.range = slot.range.and(available(slot, 1.0, 0, now));
+pub(super) fn narrow_further(slot: &mut Slot, barred: (bool, bool), now: u32) {
+    slot.range = slot.range.and(available(slot, 1.0, barred, now));
     slot.apply_rules();
 }
 
-/// Returns the available commands. `ahead` is the time to look ahead to a soft limit, in units of 1.024 ms.
-fn available(slot: &mut Slot, share: f32, ahead: u8, now: u32) -> Range {
-    let barred = soft_limits(slot, ahead);
+/// Narrows the output further, and to what the soft limits leave where the shaft is.
+pub(super) fn keep_inside(slot: &mut Slot, now: u32) {
+    let barred = soft_limits(slot, 0);
+    narrow_further(slot, barred, now);
+}
+
+/// Returns the available commands.
+fn available(slot: &mut Slot, share: f32, barred: (bool, bool), now: u32) -> Range {
     let (lower, upper) = slot.guard.range(share, barred, now);
     let word = |share: f32| to_raw(share.abs(), f32::from(slot.full_limit), slot.full_limit);
     let (down, up) = (word(lower), word(upper));
@@ -232,10 +238,11 @@ pub(in crate::dji) fn is_fit(slot: &Slot) -> bool {
 pub(in crate::dji) fn engage(slot: &mut Slot, now: u32) {
     slot.guard.engage(now);
     slot.monitor.start(&mut slot.guard.latch);
-    narrow_further(slot, now);
+    keep_inside(slot, now);
 }
 
-/// Returns whether a soft limit bars the way downward, and whether one bars the way upward.
+/// Returns whether a soft limit bars the way downward, and whether one bars the way upward. `ahead` is the time to look ahead, in units of
+/// 1.024 ms.
 fn soft_limits(slot: &mut Slot, ahead: u8) -> (bool, bool) {
     let Some((lower, upper)) = slot.health.soft_limits else { return (false, false) };
     if slot.homing == Homing::Relative {

@@ -138,3 +138,20 @@ fn a_shaft_beyond_a_limit_is_led_back_while_the_range_opens() {
         assert!((volts - 0.5 * way).abs() < 0.015, "{volts} V, {way} rad to {target}");
     }
 }
+
+/// The feedback of a fast rotor, 2 ms apart, is judged alone, whereas a check looks 12 ms ahead: 0.3 rad.
+#[test]
+fn a_limit_ahead_begins_once_while_the_range_opens() {
+    let (mut bus, [motor]) = armed([Config::<M2006>::new(1).with_health(&LIMITS)]);
+    step(&mut bus, 2);
+    bus.set_present_position(motor, Position::from_angle(Angle::from_radians(1.8))).unwrap();
+    for ms in 3..=200 {
+        if ms % 2 == 0 {
+            _ = bus.ingest(&feedback(0x201, 0, 9_000), at_ms(ms));
+        }
+        step(&mut bus, ms);
+    }
+    let edges = core::iter::from_fn(|| bus.next_edge());
+    let of_limit = edges.filter(|edge| edge.condition == Condition::SoftLimit);
+    assert_eq!(of_limit.map(|edge| edge.began).collect::<Vec<_>>(), [true]);
+}

@@ -13,6 +13,9 @@
 //! | does a target from a zero have that zero? | `MotorGuard::require_zero` | relaxed, and the target is not taken |
 //! | how far is the output range open, and which of its directions? | `MotorGuard::range` | that share of the full command |
 //!
+//! An [`Actuator`](super::Actuator) and a motor of `pwm` check their health before an update asks these questions, and ask for the share and [`Repeat`]
+//! where a bus of `dji` asks for the range and [`Hold`].
+//!
 //! The [health](super::HealthConfig) of a family finds faults, heat and a stall, and says what a second master does; each acts by
 //! [`MotorGuard::trip`]. [`DeviceGuard::is_alone`] says when a second master is gone. The tables of links and of arming, with all
 //! transitions, stand in the documentation of [`motor`](super#states).

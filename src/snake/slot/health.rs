@@ -171,6 +171,7 @@ fn is_stalled(slot: &mut Slot, now: Instant) -> bool {
         slot.stands = Standing { at: raw, since: now };
     }
     now.since(slot.stands.since) >= slot.stall.window
+        && !slot.stall.health().ignores(Condition::Stalled)
 }
 
 /// Tells whether the joint was enabled. Before, the drive reports itself as disabled. Afterwards, there may be changed values all the time,
