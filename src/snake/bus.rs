@@ -173,7 +173,7 @@ impl Joints {
     /// NaN chooses no joint for one update; a second such update in a row relaxes all joints. Frames that disable a joint are sent
     /// nevertheless.
     ///
-    /// Costs 3102 instructions on a Cortex-M4F, for 12 joints, with the frames out and an answer in (`docs/figures.md`).
+    /// Costs 3122 instructions on a Cortex-M4F, for 12 joints, with the frames out and an answer in (`docs/figures.md`).
     pub fn update(&mut self, tick: Tick) {
         let before = self.guard.begin(tick.now());
         let has_step = !TimeStep::new(tick.dt_s(), ANY_STEP_S).is_hold();

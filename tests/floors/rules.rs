@@ -184,7 +184,7 @@ const TRIPPING: [&str; 6] =
     ["trip", "relax_until_armed", "lose_zero", "lose_time", "judge", "react"];
 
 /// Calls by which a motor trips, by file: how many, and why.
-const TRIPS: [(&str, usize, &str); 9] = [
+const TRIPS: [(&str, usize, &str); 10] = [
     ("dji/device.rs", 1, "the runner trips all motors"),
     (
         "dji/slot/health.rs",
@@ -206,12 +206,13 @@ const TRIPS: [(&str, usize, &str); 9] = [
         2,
         "a drive in an unexpected state, a stall: as the configuration says",
     ),
+    ("snake/slot/health.rs", 1, "a drive in an unexpected state is not armed meanwhile"),
 ];
 
 /// Where a family asks for the state of the link, by file: how many times, and for what. The core alone says what follows for the drive.
 const LINKS: [(&str, usize, &str); 10] = [
     ("dji/device.rs", 2, "no velocity and no angle of old feedback"),
-    ("dji/slot/gap.rs", 8, "how the shaft moved in a gap"),
+    ("dji/slot/gap.rs", 10, "how the shaft moved in a gap, and whether the link recovered"),
     ("dji/slot/gap.rs", 2, "a zero at the present position; frames counted without a check"),
     ("dji/slot/health.rs", 2, "old feedback has no fault, and needs a full check"),
     ("dji/slot/health.rs", 2, "no state and no temperature before the first frame"),

@@ -36,7 +36,7 @@ pub(in crate::dji) fn receive(
         // Before the first update no tick checks ages, so every frame must: all frames then take this path.
         let is_trusted = running && !slot.traffic.is_crowded();
         slot.guard.trust(if is_trusted { trusted_gap_us(facts) } else { 0 });
-        if slot.guard.is_opening() {
+        if link == Link::Recovering || link == Link::Offline {
             health::narrow_further(slot, (false, false), now);
         }
         health::waive_check(slot, facts);

@@ -66,6 +66,8 @@ impl Slot {
     fn distrust(&mut self, now: Instant) {
         self.guard.change(now, |motor| motor.judge(Condition::Fault, true, self.stall.health()));
         self.lose_zero(now);
+        // Of a joint that is not armed too: a request to arm counts once the jumps are over.
+        self.guard.trip();
     }
 
     fn lose_zero(&mut self, now: Instant) {

@@ -340,3 +340,20 @@ fn a_joint_that_speeds_up_too_slowly_for_a_visible_motion_is_not_checked() {
         assert_eq!(seen.len(), usize::from(is_checked), "{acceleration}");
     }
 }
+
+/// Of two drives with one id, or an encoder that slips: each jump begins the pause of the gesture anew.
+#[test]
+fn a_joint_without_a_zero_that_goes_on_to_jump_is_not_armed() {
+    let mut bench = Bench::armed(&[1]);
+    bench.drive(100);
+    for jump in 0..20 {
+        bench.raw[0] = if jump % 2 == 0 { 32_768 } else { 0 };
+        bench.run(60);
+        if jump % 3 == 2 {
+            assert_eq!(bench.joints.arm(at_ms(bench.ms)), Err(ArmError::NotReleased), "{jump}");
+        }
+        assert_eq!(bench.enabled[0], 0);
+    }
+    bench.run(150);
+    assert_eq!(bench.joints.arm(at_ms(bench.ms)), Ok(()));
+}

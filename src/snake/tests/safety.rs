@@ -129,7 +129,7 @@ fn a_position_further_off_than_a_joint_can_go_disarms_it() {
     bench.drive(30);
     let state = bench.state(2);
     assert_eq!((state.position_jumps, state.is_driven, state.pulses), (1, false, -60_000));
-    assert_eq!(bench.joints.set_pulses(bench.handles[2], 0), Err(TargetError::Relaxed));
+    assert_eq!(bench.joints.set_pulses(bench.handles[2], 0), Err(TargetError::Disarmed));
     bench.drive(100);
     bench.joints.arm(at_ms(bench.ms)).unwrap();
 }
@@ -191,9 +191,11 @@ fn a_joint_that_is_armed_and_led_again_before_the_next_update_is_disabled_all_th
         let led = bench.joints.set_pulses(bench.handles[0], 3_000);
         assert_eq!(writes(&bench.take()), [Command::DISABLE], "{what}");
         if armed == Err(ArmError::NotReleased) {
-            let by_hand = what == "stopped";
-            let why = if by_hand { TargetError::Disarmed } else { TargetError::Relaxed };
-            assert_eq!((led, writes(&bench.run(50))), (Err(why), Vec::new()), "{what}");
+            assert_eq!(
+                (led, writes(&bench.run(50))),
+                (Err(TargetError::Disarmed), Vec::new()),
+                "{what}"
+            );
             continue;
         }
         assert_eq!((armed, led), (Ok(()), Ok(())), "{what}");
