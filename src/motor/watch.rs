@@ -180,9 +180,8 @@ impl Watch {
     fn compare_answers(&mut self, guard: &mut Guard, now: Instant) {
         self.answers.compare();
         let is_alone = !guard.conditions().contains(Condition::SecondMaster);
-        if !self.config.ignores(Condition::DuplicateId) {
-            guard.note(Condition::DuplicateId, is_alone && !self.answers.are_of_one(), now);
-        }
+        let is_double = is_alone && !self.answers.are_of_one();
+        guard.change(now, |motor| motor.judge(Condition::DuplicateId, is_double, self.config));
     }
 
     #[cold]

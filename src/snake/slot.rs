@@ -285,9 +285,9 @@ impl Slot {
         if self.reversed { pulses.wrapping_neg() } else { pulses }
     }
 
-    /// Tells whether there is no position yet, or no fresh position.
+    /// Tells whether there is no fresh position.
     pub(super) fn is_missing(&self, now: Instant) -> bool {
-        self.id.is_some() && (self.raw.is_none() || self.guard.is_missing(now))
+        self.id.is_some() && self.guard.is_missing(now)
     }
 }
 
