@@ -238,7 +238,7 @@ impl<B, const N: usize> Bus<B, N> {
             .set(motor.into().key(), |slot, now| slot.set_angle(Position::from_angle(angle), now))
     }
 
-    /// Sets the multi-turn position for the position loop, clamped to the soft limits if there are any.
+    /// Sets the multi-turn position for the position loop, within the [soft limits](crate::motor::HealthConfig::with_soft_limits), if any.
     ///
     /// Costs 74 instructions on a Cortex-M4F (`docs/figures.md`).
     ///

@@ -90,8 +90,8 @@ pub use drive::{AngleDrive, Measured, OneOf, TargetError, VelocityDrive};
 pub use guard::Guard;
 pub(crate) use guard::furthest;
 pub(crate) use health::{
-    Answers, Journal, Latch, Latched, Monitor, Sample, Severity, Traffic, check_soft_limits,
-    elapsed,
+    Answers, BACK, BRAKING_S, Journal, Latch, Latched, Monitor, Sample, Severity, Traffic,
+    check_soft_limits, elapsed, velocity_inside,
 };
 pub use health::{Condition, Conditions, Health, HealthConfig, Reaction};
 pub use homing::{HomingStep, StopHoming};

@@ -4,10 +4,13 @@ use super::{Action, Duty, Goal, Slot};
 use crate::control::Pid;
 use crate::dji::codec::{Range, saturate, to_raw};
 use crate::dji::outbox::Outbox;
-use crate::encoder::Position;
-use crate::motor::{Rest, TargetError};
+use crate::encoder::{Homing, Position};
+use crate::motor::{Rest, TargetError, velocity_inside};
 use crate::time::TimeStep;
 use crate::units::Angle;
+
+/// A target is so far inside of a soft limit, in rad.
+const MARGIN: f32 = 0.015;
 
 impl Slot {
     /// Discards the target: zero output, loops reset.
@@ -46,9 +49,17 @@ impl Slot {
         Ok(())
     }
 
+    /// Returns the limits of targets, inside of the soft limits: where the output is barred outward, no load is held. `None` without limits,
+    /// and while the position is not known.
+    fn limits(&self) -> Option<(f32, f32)> {
+        let (lower, upper) = self.health.soft_limits.filter(|_| self.homing != Homing::Relative)?;
+        let margin = MARGIN.min(0.25 * (upper - lower));
+        Some((lower + margin, upper - margin))
+    }
+
     /// Returns the nearest position within the soft limits.
     fn inside(&self, position: Position) -> Position {
-        let Some((lower, upper)) = self.health.soft_limits else { return position };
+        let Some((lower, upper)) = self.limits() else { return position };
         let radians = position.as_angle().as_radians();
         if radians < lower {
             Position::from_angle(Angle::from_radians(lower))
@@ -158,7 +169,9 @@ impl Slot {
         if !self.guard.latch.active().is_empty() || self.guard.is_opening() {
             self.require_check();
         }
-        let is_free = self.range == Range::within(self.full_limit) && self.speed.core.is_plain();
+        let is_free = self.range == Range::within(self.full_limit)
+            && self.speed.core.is_plain()
+            && self.health.soft_limits.is_none();
         self.duty = match self.asked {
             _ if !self.guard.drives() => Duty::Rest,
             _ if self.has_rested() => Duty::First,
@@ -187,7 +200,8 @@ impl Slot {
         let mut velocity = self.velocity().as_rad_per_s();
         let way = match self.asked {
             Action::Velocity => {
-                return self.follow_velocity(self.goal.rad_per_s(), velocity, dt_s);
+                let goal = self.slowed(self.goal.rad_per_s());
+                return self.follow_velocity(goal, velocity, dt_s);
             }
             Action::Position => self.shaft.way_to(self.goal.turns, self.goal.value),
             Action::Angle => self.shaft.shortest_way_to(self.goal.value),
@@ -200,7 +214,14 @@ impl Slot {
         };
         let step = TimeStep::of_motor(dt_s);
         let goal = self.position.as_pid(|pid| pid.step_error(way, velocity, &step));
-        self.follow_velocity(goal * self.opened_part(), velocity, dt_s)
+        let goal = self.slowed(goal * self.opened_part());
+        self.follow_velocity(goal, velocity, dt_s)
+    }
+
+    /// Returns the velocity within the soft limits.
+    fn slowed(&self, rad_per_s: f32) -> f32 {
+        let Some(limits) = self.limits() else { return rad_per_s };
+        velocity_inside(limits, self.shaft.position().as_angle().as_radians(), rad_per_s)
     }
 
     /// Returns the share of its velocity available to a position loop: the open share of the output range.

@@ -3,7 +3,9 @@
 use super::power::Reading;
 use super::{Impedance, Shaft, Target};
 use crate::math::{limited, wrap_pi};
-use crate::motor::{Condition, Latch, TargetError, check_soft_limits};
+use crate::motor::{
+    BACK, BRAKING_S, Condition, Latch, TargetError, check_soft_limits, velocity_inside,
+};
 use crate::units::{Angle, AngularVelocity};
 use core::f32::consts::TAU;
 
@@ -188,13 +190,9 @@ pub(super) struct Inside {
     velocity: f32,
 }
 
-/// A shaft comes no sooner to a limit than in this time, in s, at its present velocity.
-const BRAKING_S: f32 = 0.1;
 /// At a limit, a torque brakes in proportion to the velocity up to half of this, in rad/s: at a lower one, the torque would
 /// change its sign with each step of a light joint.
 const SLOW: f32 = 4.0;
-/// An outward velocity beyond a limit leads back, at most so fast in rad/s.
-const BACK: f32 = 0.5;
 /// An angle in the place of a velocity leads the shaft by at most this way in rad, or by the way in this time in s: a blocked shaft turns
 /// no further at once when freed.
 const AHEAD: f32 = 0.25;
@@ -251,12 +249,8 @@ impl Inside {
     }
 
     fn velocity(&self, velocity: AngularVelocity) -> AngularVelocity {
-        let wanted = velocity.as_rad_per_s();
-        // A target of zero moves no shaft.
-        let back = wanted.abs().min(BACK);
-        let least = ((self.lower - self.here) / BRAKING_S).min(back);
-        let most = ((self.upper - self.here) / BRAKING_S).max(-back);
-        AngularVelocity::from_rad_per_s(limited(wanted, least, most))
+        let limits = (self.lower, self.upper);
+        AngularVelocity::from_rad_per_s(velocity_inside(limits, self.here, velocity.as_rad_per_s()))
     }
 
     fn torque(&self, torque_nm: f32) -> f32 {

@@ -123,6 +123,11 @@ impl HealthConfig {
     /// Outside, the motor is driven inward only, also if the shaft starts there; at speed, already a little before. No effect while the
     /// absolute position is unknown: for a geared motor, until the position is set. A motor without CAN refuses soft limits.
     ///
+    /// A motor of a [`dji::Bus`](crate::dji::Bus) is held 0.015 rad inside of a limit, under any load and without an edge: a position outside is
+    /// that limit, an outward velocity, also that of a position loop, is at most the distance divided by 0.1 s, and an angle whose shortest way
+    /// leads out stops there. Beyond, an outward velocity leads back as below. A current or voltage outward is zero at the limit and beyond, so the
+    /// shaft coasts; at a speed that the motor cannot brake in the distance left, each target does.
+    ///
     /// An [`Actuator`](crate::motor::Actuator) changes each kind of target, and has the edge from 0.02 rad before a limit. A mode that takes
     /// angles, loops of this crate and a stiffness hold a loaded joint at its limit; a damper alone and a torque do not:
     ///

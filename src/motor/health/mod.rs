@@ -33,7 +33,9 @@ use crate::time::Duration;
 
 pub use config::{HealthConfig, Reaction};
 pub(crate) use edge::{Journal, Latch, Latched};
-pub(crate) use monitor::{Monitor, Sample, check_soft_limits, elapsed};
+pub(crate) use monitor::{
+    BACK, BRAKING_S, Monitor, Sample, check_soft_limits, elapsed, velocity_inside,
+};
 pub(crate) use traffic::{Answers, Traffic};
 
 /// State and statistics of a motor, in one line of a log.

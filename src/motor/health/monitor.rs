@@ -1,4 +1,5 @@
 use super::{Condition, HealthConfig, Latch};
+use crate::math::limited;
 
 /// Returns the time between two checks in units of 1.024 ms, at most 128.
 pub(crate) fn elapsed(micros: Option<u32>) -> u8 {
@@ -320,6 +321,20 @@ pub(crate) fn check_soft_limits(
         latch.has(Condition::SoftLimit) && !(here > lower + CLEAR_RAD && here < upper - CLEAR_RAD);
     latch.set(Condition::SoftLimit, below || above || lingers);
     (below, above)
+}
+
+/// A shaft comes no sooner to a soft limit than in this time, in s, at its present velocity.
+pub(crate) const BRAKING_S: f32 = 0.1;
+/// An outward velocity beyond a soft limit leads back, at most so fast in rad/s.
+pub(crate) const BACK: f32 = 0.5;
+
+/// Returns the velocity of a target within soft limits, in rad and rad/s: slower toward a limit, and back from beyond.
+pub(crate) fn velocity_inside((lower, upper): (f32, f32), here: f32, wanted: f32) -> f32 {
+    // A target of zero moves no shaft.
+    let back = wanted.abs().min(BACK);
+    let least = ((lower - here) / BRAKING_S).min(back);
+    let most = ((upper - here) / BRAKING_S).max(-back);
+    limited(wanted, least, most)
 }
 
 /// Detects a motor that is driven and does not turn, in either direction. Returns the share of the output that stays available.
