@@ -299,7 +299,7 @@ impl<const N: usize> DeviceGuard<N> {
     /// Ends an arming: the trip goes on if a motor still waits to be armed.
     pub(crate) fn end_arming<M: Guarded>(&mut self, motors: &mut [M]) {
         if motors.iter_mut().any(|motor| motor.guard().is_tripped()) {
-            self.trip();
+            (self.gesture.tripped, self.gesture.granted) = (true, false);
         }
     }
 
