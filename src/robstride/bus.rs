@@ -144,7 +144,7 @@ impl Motor {
     /// the supply if [stored](Self::store), a CyberGear does not.
     ///
     /// # Errors
-    /// [`ConfigError::Unsupported`] from when the drive is enabled until it reports that it rests: the shaft would jump.
+    /// [`ConfigError::Unsupported`] between the enabling frame and the first report of rest: the shaft would jump.
     pub fn set_zero(&mut self) -> Result<(), ConfigError> {
         self.request(Command::SetZero)
     }
