@@ -5,6 +5,7 @@ use crate::control::Pid;
 use crate::dji::codec::{Range, saturate, to_raw};
 use crate::dji::outbox::Outbox;
 use crate::encoder::{Homing, Position};
+use crate::math::limited;
 use crate::motor::{Rest, TargetError, velocity_inside};
 use crate::time::TimeStep;
 use crate::units::Angle;
@@ -61,13 +62,10 @@ impl Slot {
     fn inside(&self, position: Position) -> Position {
         let Some((lower, upper)) = self.limits() else { return position };
         let radians = position.as_angle().as_radians();
-        if radians < lower {
-            Position::from_angle(Angle::from_radians(lower))
-        } else if radians > upper {
-            Position::from_angle(Angle::from_radians(upper))
-        } else {
-            position
+        if (lower..=upper).contains(&radians) {
+            return position;
         }
+        Position::from_angle(Angle::from_radians(limited(radians, lower, upper)))
     }
 
     /// Tells whether a target may be taken; if not, the previous target may be cancelled.
