@@ -13,6 +13,36 @@ use embedded_can::{Frame, StandardId};
 mod custom_motor;
 use custom_motor::MyMotor;
 
+/// The motor of the example, which stands: its current after so many ms of a target, the last with targets that come before it.
+fn amperes_of_blocked(millis: u64, before_last: &[f32]) -> f32 {
+    let mut motor = Actuator::new(MyMotor::new(3).unwrap());
+    let (feedback, mut amperes) = (CanFrame::of(StandardId::new(0x143).unwrap(), [0, 0, 31]), 0.0);
+    for ms in 1..=millis {
+        let now = Instant::from_micros(1_000 * ms);
+        assert_eq!(motor.ingest(&feedback, now), Ingest::Taken);
+        if ms == 1 {
+            motor.arm(now).unwrap();
+        }
+        for rpm in before_last.iter().filter(|_| ms == millis) {
+            assert!(motor.set_velocity((), AngularVelocity::from_rpm(*rpm)).is_err());
+        }
+        motor.set_velocity((), AngularVelocity::from_rpm(20.0)).unwrap();
+        motor.update(Tick::new(now, 0.001));
+        while let Some(frame) = motor.next_frame(0) {
+            let [a, b, c, d] = *frame.data() else { panic!("{frame:?}") };
+            amperes = f32::from_le_bytes([a, b, c, d]);
+        }
+    }
+    amperes
+}
+
+/// A refused target takes the one before away, also where a good one comes in the same cycle: the loop starts afresh, from zero.
+#[test]
+fn a_good_target_behind_a_refused_one_starts_afresh() {
+    let (whole, afresh) = (amperes_of_blocked(500, &[]), amperes_of_blocked(500, &[f32::NAN]));
+    assert!(whole > 1.0 && afresh.abs() < 0.05 * whole, "{afresh} A after {whole} A");
+}
+
 /// As in the example: 0.2 Nm for each ampere, 0.004 kg m² and friction at the output, a gear of 27.
 fn fastest_rpm(target_rpm: f32) -> f32 {
     let mut motor = Actuator::new(MyMotor::new(3).unwrap());

@@ -289,6 +289,7 @@ fn an_old_command_is_not_repeated_by_a_late_step_without_length() {
         let (mut bus, motor) = armed(at_once(1));
         bus.set_raw(motor, 100).unwrap();
         step(&mut bus, 2_000);
+        hear(&mut bus, feedback(0x201, 0, 0), 2_000 + pause);
         bus.update(Tick::new(us(2_000 + pause), 0.0));
         assert_eq!(sent(&mut bus).last(), Some(&(0x200, [word, 0, 0, 0])), "{pause}");
     }
@@ -514,7 +515,7 @@ fn a_minute_without_an_update_is_late_but_no_pause_and_a_microsecond_more_is_one
 
         let (mut bus, motor) = armed(at_once(1));
         step(&mut bus, 1_500);
-        hear(&mut bus, feedback(0x201, 0, 0), 1_500);
+        hear(&mut bus, feedback(0x201, 0, 0), 1_500 + pause - 1);
         bus.update(Tick::new(us(1_500 + pause), 0.0));
         assert_eq!(bus.link(motor), Some(link), "{pause}, and no step");
     }

@@ -8,7 +8,6 @@ use super::slot::{Key, Slot, health};
 use super::{AttachError, Facts};
 use crate::motor::{ArmError, BusLoad, Claim, Condition, MotorName, Obstacles};
 use crate::time::Instant;
-use core::ops::Range;
 use embedded_can::StandardId;
 
 /// Attaches a motor; see [`Bus::attach`](super::Bus::attach).
@@ -121,27 +120,21 @@ pub(super) fn arm_only<const N: usize>(
         found.second_master = rival_among(slots());
         found.faulty.extend_unfit(slots().filter_map(health::unfit));
     })?;
-    if !motors.guard.begin_arming(now) {
-        return Ok(());
-    }
-    for motor in chosen {
-        if motors.get(motor).is_some() {
-            let place = motor.place();
-            engage(motors, place..place + 1, now);
-        }
-    }
-    motors.end_arming();
+    engage(motors, now, |index, slot| {
+        chosen.clone().any(|motor| motor.place() == index && slot.matches(motor))
+    });
     Ok(())
 }
 
-/// Arms the motors of some slots that are online and fit.
-pub(super) fn engage<const N: usize>(motors: &mut Motors<N>, slots: Range<u8>, now: Instant) {
-    for index in slots {
-        let slot = motors.slots.get(usize::from(index)).filter(|slot| health::is_fit(slot));
-        if slot.is_some_and(|slot| motors.guard.may_engage(&slot.guard, now)) {
-            motors.change(index, now, |slot| health::engage(slot, now.stamp()));
-        }
-    }
+/// Arms the chosen motors that are online and fit.
+pub(super) fn engage<const N: usize>(
+    motors: &mut Motors<N>,
+    now: Instant,
+    is_chosen: impl Fn(u8, &Slot) -> bool,
+) {
+    let (guard, slots) = motors.parts();
+    let is_chosen = |index, slot: &Slot| health::is_fit(slot) && is_chosen(index, slot);
+    guard.engage(slots, now, is_chosen, |slot| health::start(slot, now.stamp()));
 }
 
 /// Tells whether there are motors, and all take targets.

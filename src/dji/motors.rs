@@ -223,12 +223,6 @@ impl<const N: usize> Motors<N> {
         guard.pass_unwatched(slots, now);
     }
 
-    /// Ends an arming.
-    pub(super) fn end_arming(&mut self) {
-        let (guard, slots) = self.parts();
-        guard.end_arming(slots);
-    }
-
     /// [Changes](Self::change) each slot that may be in use.
     pub(super) fn change_all(&mut self, now: Instant, change: impl Fn(&mut Slot)) {
         let (guard, slots) = self.parts();

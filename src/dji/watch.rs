@@ -10,7 +10,7 @@ use super::slot::health::CheckRound;
 use super::slot::{Slot, Surroundings, gap, health};
 use super::{CommandFrame, Feedback};
 use crate::frame::CanFrame;
-use crate::motor::{Condition, Hold, Ingest, MotorName};
+use crate::motor::{Condition, Hold, Ingest, MotorName, Turn};
 use crate::time::{Edge, Instant};
 
 /// Takes any frame.
@@ -85,13 +85,11 @@ pub(super) fn apply_due<const N: usize>(
     outbox: &mut Outbox,
     before: Instant,
 ) -> bool {
-    let keep_alive_us = outbox.keep_alive(motors.guard.now());
-    let (guard, slots) = motors.parts();
-    let held = guard.pass(slots, before, true, keep_alive_us);
-    if held.is_err() {
-        finish(motors, outbox, held);
+    let held = pass(motors, outbox, before, true);
+    if let Some(hold) = held {
+        finish(motors, outbox, hold);
     }
-    held.is_ok()
+    held.is_none()
 }
 
 /// Ends an update without a usable time step.
@@ -102,19 +100,29 @@ pub(super) fn end_without_step<const N: usize>(
     outbox: &mut Outbox,
     before: Instant,
 ) {
-    outbox.keep_alive(motors.guard.now());
-    let (guard, slots) = motors.parts();
-    let held = guard.pass(slots, before, false, 0);
-    finish(motors, outbox, held);
+    if let Some(hold) = pass(motors, outbox, before, false) {
+        finish(motors, outbox, hold);
+    }
 }
 
-fn finish<const N: usize>(motors: &mut Motors<N>, outbox: &mut Outbox, held: Result<(), Hold>) {
+fn pass<const N: usize>(
+    motors: &mut Motors<N>,
+    outbox: &mut Outbox,
+    before: Instant,
+    has_step: bool,
+) -> Option<Hold> {
+    let keep_alive_us = outbox.keep_alive(motors.guard.now());
+    let (guard, slots) = motors.parts();
+    guard.pass(slots, before, has_step, keep_alive_us)
+}
+
+fn finish<const N: usize>(motors: &mut Motors<N>, outbox: &mut Outbox, hold: Hold) {
     motors.bad_steps = motors.bad_steps.saturating_add(1);
-    if held != Err(Hold::Keep) {
+    if hold != Hold::Keep {
         outbox.clear();
     }
-    // A motor without a target rests at once.
-    for slot in motors.slots.iter().filter(|slot| slot.has_rested()) {
+    let repeats = |slot: &Slot| slot.guard.turn(Some(hold)) == Turn::Repeat;
+    for slot in motors.slots.iter().filter(|slot| !repeats(slot)) {
         outbox.put(slot.place, 0);
     }
     outbox.finish_update();

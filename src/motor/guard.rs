@@ -1,24 +1,12 @@
 //! Rules of a motor that is a device by itself.
 
 use super::age;
-use super::safety::{DeviceGuard, MotorGuard, OPENING};
-use crate::math::limited;
-use crate::motor::{Condition, Conditions, HealthConfig, Link, TargetError, Timeouts};
+use super::safety::{DeviceGuard, Hold, MotorGuard, OPENING, Rest, Turn};
+use crate::motor::{Condition, HealthConfig, Link, TargetError, Timeouts};
 use crate::time::{Duration, Instant};
 
 /// After a silence of so long a drive may have started again, in µs.
 pub(super) const SILENCE_US: u32 = 100_000;
-
-/// Feedback may have waited in a buffer for so long, in s.
-const WAITED_S: f32 = 0.04;
-
-/// Returns the largest way in rad of a shaft between two readings so many s apart: at this velocity in rad/s for a little longer than that,
-/// or with a speed limit toward a target as far away; beside that 8 rad/s, for a shaft that sped up and stopped meanwhile.
-pub(crate) fn furthest(gap_s: f32, velocity: f32, (to_target, speed): (f32, f32)) -> f32 {
-    let time_s = limited(gap_s, WAITED_S, f32::MAX);
-    let asked = limited(speed * time_s, 0.0, to_target);
-    8.0 * gap_s + limited(1.5 * velocity * time_s, asked, f32::MAX)
-}
 
 /// Decides whether one motor of your own may be driven, by the rules of all motors of this crate:
 ///
@@ -123,10 +111,19 @@ impl Guard {
         });
     }
 
+    /// Trips as by a fault of the drive. A request to arm counts when this was not called for 100 ms.
+    pub(crate) fn fail(&mut self, now: Instant, config: &HealthConfig) {
+        self.change(now, |motor| {
+            motor.judge(Condition::Fault, true, config);
+            motor.trip();
+        });
+        self.device.trip();
+    }
+
     /// Notes a command of the motor by another node.
-    pub(super) fn hear_rival(&mut self, now: Instant) {
+    pub(crate) fn hear_rival(&mut self, now: Instant, config: &HealthConfig) {
         self.device.hear_rival(now.stamp());
-        self.change(now, |motor| motor.latch.set(Condition::SecondMaster, true));
+        self.change(now, |motor| motor.judge(Condition::SecondMaster, true, config));
         self.device.wake_at(self.device.updated());
     }
 
@@ -164,17 +161,27 @@ impl Guard {
     #[must_use]
     #[inline]
     pub fn drives(&mut self, now: Instant) -> bool {
-        let before = self.device.begin(now);
-        (self.device.is_quiet(before, now) || self.compare_ages(before, now)) && self.motor.drives()
+        self.pass(now, true).is_none() && self.motor.drives()
     }
 
-    /// Applies all due time-outs, and computes the time of the next. Returns `false` if time did not move on.
+    /// Moves the time on to a tick and applies all due time-outs. Returns the [`Hold`] of an update without a usable time or step.
+    #[inline]
+    pub(crate) fn pass(&mut self, now: Instant, has_step: bool) -> Option<Hold> {
+        let before = self.device.begin(now);
+        if has_step && self.device.is_quiet(before, now) {
+            return None;
+        }
+        self.compare_ages(before, now, has_step)
+    }
+
+    /// Applies all due time-outs, and computes the time of the next.
     #[cold]
     #[inline(never)]
-    fn compare_ages(&mut self, before: Instant, now: Instant) -> bool {
+    fn compare_ages(&mut self, before: Instant, now: Instant, has_step: bool) -> Option<Hold> {
         let motors = core::slice::from_mut(&mut self.motor);
-        if self.device.pass(motors, before, true, u32::MAX).is_err() {
-            return false;
+        let held = self.device.pass(motors, before, has_step, u32::MAX);
+        if held.is_some() {
+            return held;
         }
         // The range of a motor that is not driven must be open before its stamp repeats.
         self.motor.share(now.stamp());
@@ -185,7 +192,23 @@ impl Guard {
         if self.motor.latch.has(Condition::SecondMaster) {
             self.device.wake_at(now);
         }
-        true
+        None
+    }
+
+    /// Tells what the tick does, after [`pass`](Self::pass) and the checks of the health.
+    #[inline]
+    pub(crate) fn turn(&self, held: Option<Hold>) -> Turn {
+        self.motor.turn(held)
+    }
+
+    /// Notes a pause: the last command is not sent again.
+    pub(super) fn pause(&mut self) {
+        self.motor.pause();
+    }
+
+    /// Ends the rest, as the loops run, and returns its kind.
+    pub(crate) const fn end_rest(&mut self) -> Rest {
+        self.motor.end_rest()
     }
 
     /// Returns the open share of the output range, 0 to 1; the share rises from zero after arming.
@@ -193,15 +216,14 @@ impl Guard {
         self.motor.share(self.device.now())
     }
 
+    /// Returns the open share of the output range, at most the share that the conditions leave.
+    pub(crate) fn share_of(&mut self, left: f32) -> f32 {
+        self.motor.range(left, (false, false), self.device.now()).1
+    }
+
     /// Closes the output range and opens it from now on: the drive did not follow before.
     pub(super) const fn reopen(&mut self) {
         self.motor.open(self.device.now());
-    }
-
-    /// Tells whether the time of the last update moved on. If not, the length of nothing that lasts until now is known.
-    #[cfg(feature = "hal")]
-    pub(crate) const fn knows_time(&self) -> bool {
-        !self.motor.latch.has(Condition::ClockFault)
     }
 
     /// Handles a time that did not move on, so that no age is known. Feedback counts as late until the next frame, and the motor trips.
@@ -264,11 +286,8 @@ impl Guard {
     /// Allows targets from now on, beginning without a target, if the motor is online and, after a trip, the last request
     /// [counts](Self::ask). An armed motor goes on undisturbed. While stopped, `engage` has no effect. Returns whether the motor was armed.
     pub fn engage(&mut self, now: Instant) -> bool {
-        let begins = self.device.may_engage(&self.motor, now) && self.device.begin_arming(now);
-        if begins {
-            self.motor.engage(now.stamp());
-        }
-        begins
+        let motors = core::slice::from_mut(&mut self.motor);
+        self.device.engage(motors, now, |_, _| true, |_| {})
     }
 
     /// Refuses targets until engaged again.
@@ -315,13 +334,13 @@ impl Guard {
     /// Returns the number of NaN or infinite targets, saturating.
     #[must_use]
     pub const fn refused_targets(&self) -> u16 {
-        self.motor.refused_targets()
+        self.motor.refused_targets
     }
 
     /// Returns the number of expired targets, saturating.
     #[must_use]
     pub const fn forgotten_targets(&self) -> u16 {
-        self.motor.forgotten_targets()
+        self.motor.forgotten_targets
     }
 }
 
@@ -338,7 +357,7 @@ impl Guard {
     pub(crate) fn hear_in_time(&mut self, now: Instant) -> bool {
         let now = now.stamp();
         let since_update = now.wrapping_sub(self.device.now());
-        let is_in_time = self.motor.is_in_time(now) && self.motor.trusts(since_update);
+        let is_in_time = self.motor.is_in_time(now) && self.motor.in_time.trusts(since_update);
         if is_in_time {
             self.motor.hear_in_time(now);
         }
@@ -353,7 +372,7 @@ impl Guard {
 
     /// Returns the number of frames [in time](Self::hear_in_time) since the last call.
     pub(crate) const fn take_in_time(&mut self) -> u16 {
-        self.motor.take_in_time()
+        self.motor.in_time.take()
     }
 
     /// Moves the time on to a tick in which no rule has to be applied and the motor may be driven; otherwise returns `false`, and moves
@@ -379,23 +398,6 @@ impl Guard {
     }
 }
 
-/// Consequences of the conditions of a motor.
-impl MotorGuard {
-    /// Sets whether a condition holds that is not ignored, and takes its consequences.
-    pub(crate) fn judge(&mut self, condition: Condition, holds: bool, config: &HealthConfig) {
-        let before = self.latch.active();
-        self.latch.set(condition, holds && !config.ignores(condition));
-        self.react(before, config);
-    }
-
-    /// Trips the motor if a condition that began since `before` demands rest, or the motor must not be armed.
-    pub(crate) const fn react(&mut self, before: Conditions, config: &HealthConfig) {
-        if config.relaxes(before, self.latch.active()) {
-            self.trip();
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -418,17 +420,6 @@ mod tests {
         guard.engage(at_ms(1));
         guard.admit(true).unwrap();
         guard
-    }
-
-    /// By hand: 8 rad/s for the gap, beside one and a half times the velocity, or the way to the target at the speed limit, for 40 ms or more.
-    #[test]
-    fn a_shaft_turns_so_far_between_two_readings() {
-        let near = |one: f32, other: f32| assert!((one - other).abs() < 1e-6, "{one} of {other}");
-        near(furthest(0.01, 3.0, (0.0, 0.0)), 0.08 + 0.18);
-        near(furthest(0.1, 3.0, (0.0, 0.0)), 0.8 + 0.45);
-        near(furthest(0.1, 0.0, (100.0, 5.0)), 0.8 + 0.5);
-        near(furthest(0.1, 0.0, (0.2, 5.0)), 0.8 + 0.2);
-        near(furthest(0.1, 3.0, (0.2, 5.0)), 0.8 + 0.45);
     }
 
     #[test]

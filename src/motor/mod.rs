@@ -88,18 +88,16 @@ pub use devices::Devices;
 pub(crate) use devices::ask;
 pub use drive::{AngleDrive, Measured, OneOf, TargetError, VelocityDrive};
 pub use guard::Guard;
-pub(crate) use guard::furthest;
 pub(crate) use health::{
     Answers, BACK, BRAKING_S, Journal, Latch, Latched, Monitor, Sample, Severity, Traffic,
     check_soft_limits, elapsed, velocity_inside,
 };
-pub use health::{Condition, Conditions, Health, HealthConfig, Reaction};
+pub use health::{Condition, Conditions, Health, HealthConfig, Reaction, Vitals};
 pub use homing::{HomingStep, StopHoming};
+pub(crate) use link::{InTime, age, is_near, take_age};
 pub use link::{Link, Timeouts};
-pub(crate) use link::{age, is_near, take_age};
 pub use load::BusLoad;
 pub use safety::OPENING;
-pub(crate) use safety::{DeviceGuard, Guarded, Hold, MotorGuard, Repeat, Rest};
+pub(crate) use safety::{DeviceGuard, Guarded, Hold, MotorGuard, Rest, Turn};
 pub use switch::{ArmingSwitch, SwitchOrder};
-pub use watch::Vitals;
 pub(crate) use watch::Watch;

@@ -1,13 +1,19 @@
 //! Health of one motor outside of a bus: its vitals, their checks, and its conditions.
 
 use super::{
-    Answers, Condition, Conditions, Guard, Health, HealthConfig, Latch, Link, Monitor, MotorName,
-    Sample, Severity, Traffic, elapsed,
+    Answers, Condition, Conditions, Guard, Health, HealthConfig, Latch, Link, Monitor, MotorGuard,
+    MotorName, Reaction, Traffic, Vitals,
 };
 use crate::time::{Duration, Edge, Instant};
 
 /// The checks of a motor without a configuration of its own.
 static USUAL: HealthConfig = HealthConfig::new();
+
+/// The conditions that a program notes have no consequence but an edge.
+static NO_REACTION: HealthConfig = HealthConfig::new()
+    .with_reaction(Condition::Fault, Reaction::Report)
+    .with_reaction(Condition::DuplicateId, Reaction::Report)
+    .with_reaction(Condition::Runaway, Reaction::Report);
 
 /// Period of the checks of slow quantities in µs: temperature, effort, speed. A power of two.
 const PERIOD_US: u64 = 8_192;
@@ -111,11 +117,12 @@ impl Watch {
     /// Notes a command of another node, which relaxes the motor where a second master demands rest. The drive answers that node too.
     pub(crate) fn hear_rival(&mut self, guard: &mut Guard, now: Instant) {
         self.answers = Answers::BESIDE_RIVAL;
-        let before = guard.conditions();
-        if !self.config.ignores(Condition::SecondMaster) {
-            guard.note(Condition::SecondMaster, true, now);
-        }
-        guard.change(now, |motor| motor.react(before, self.config));
+        guard.hear_rival(now, self.config);
+    }
+
+    /// Trips the motor as by a fault that the drive reports in one update.
+    pub(crate) fn fail(&self, guard: &mut Guard, now: Instant) {
+        guard.fail(now, self.config);
     }
 
     /// Tells whether the motor must not be armed.
@@ -196,16 +203,16 @@ impl Watch {
         let before = guard.conditions();
         if guard.link() != Link::Online {
             self.monitor = Monitor::NEW;
-        } else {
-            guard.change_conditions(now, |latch| {
-                self.read_error(latch, &vitals);
-                if let Some(since) = since {
-                    let sample = vitals.sample(since, self.config);
-                    self.share = self.monitor.check(latch, &sample, self.config);
-                }
-            });
         }
-        guard.change(now, |motor| motor.react(before, self.config));
+        guard.change_conditions(now, |latch| {
+            // An error that was reported before the feedback was late counts too.
+            self.read_error(latch, &vitals);
+            if let Some(since) = since {
+                let sample = vitals.sample(since, self.config);
+                self.share = self.monitor.check(latch, &sample, self.config);
+            }
+        });
+        guard.change(now, |motor| motor.react(before, self.share, self.config));
         self.share
     }
 
@@ -247,72 +254,6 @@ impl Watch {
     }
 }
 
-/// Quantities known to an actuator beside its velocity: every known quantity is monitored.
-///
-/// Shares are relative to the largest command, current or speed without load: 0.5 is half; negative in the other
-/// direction.
-///
-/// # Examples
-/// ```
-/// use drivetrain::motor::Vitals;
-///
-/// let vitals = Vitals { temperature_c: Some(35), effort: 0.8, speed: 0.01, ..Vitals::default() };
-/// assert_eq!((vitals.has_fault, vitals.current), (false, 0.0));
-/// ```
-#[derive(Debug, Default, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Vitals {
-    /// Its temperature in °C. Watched when its [`HealthConfig`] has temperatures.
-    pub temperature_c: Option<i16>,
-    /// Whether the ESC reports a fault: the motor must not be driven.
-    pub has_fault: bool,
-    /// Whether the ESC reports a warning, and continues. During a fault, no warning counts.
-    pub has_warning: bool,
-    /// The error code, for the log.
-    pub error_code: u8,
-    /// The command of the last [`control`](super::DriveProtocol::control), as a share; 0 if not known, and then neither stall
-    /// nor runaway is detected.
-    pub effort: f32,
-    /// The speed as a share of the speed without load.
-    pub speed: f32,
-    /// The current as a share; 0 if not known.
-    pub current: f32,
-}
-
-impl Vitals {
-    pub(crate) const fn error(&self) -> Option<Severity> {
-        match (self.has_fault, self.has_warning) {
-            (true, _) => Some(Severity::Fault),
-            (false, true) => Some(Severity::Warning),
-            (false, false) => None,
-        }
-    }
-
-    /// Returns the slow quantities, so long after the last check.
-    #[inline]
-    fn sample(&self, since: Duration, config: &HealthConfig) -> Sample {
-        Sample {
-            elapsed: elapsed(since.micros_u32()),
-            fresh: false,
-            effort: self.effort,
-            speed: self.speed,
-            current: self.current,
-            word: 0,
-            word_change: u8::MAX,
-            angle: 0,
-            rest: 0,
-            temperature: self.temperature_c.zip(config.temperatures_c()),
-        }
-    }
-
-    /// Returns vitals with the first of several codes of faults, or the code of a warning; 0 for none.
-    pub(crate) fn of_errors<const N: usize>(faults: [u8; N], warning: u8) -> Self {
-        let fault = faults.into_iter().find(|code| *code > 0);
-        let (has_fault, has_warning) = (fault.is_some(), fault.is_none() && warning > 0);
-        Self { has_fault, has_warning, error_code: fault.unwrap_or(warning), ..Self::default() }
-    }
-}
-
 /// Conditions and their unread edges.
 impl Guard {
     /// Sets whether a condition of the motor holds. A change is an edge, latched until read.
@@ -321,7 +262,7 @@ impl Guard {
     /// update more than a second after the last.
     pub fn note(&mut self, condition: Condition, holds: bool, now: Instant) {
         if condition == Condition::SecondMaster && holds {
-            return self.hear_rival(now);
+            return self.hear_rival(now, &NO_REACTION);
         }
         self.change_conditions(now, |latch| latch.set(condition, holds));
     }
@@ -389,17 +330,29 @@ impl Guard {
     }
 }
 
+/// Consequences of the conditions of a motor.
+impl MotorGuard {
+    /// Sets whether a condition holds that is not ignored, and takes its consequences.
+    pub(crate) fn judge(&mut self, condition: Condition, holds: bool, config: &HealthConfig) {
+        let before = self.latch.active();
+        self.latch.set(condition, holds && !config.ignores(condition));
+        self.react(before, 1.0, config);
+    }
+
+    /// Trips the motor if a condition that began since `before` demands rest, or the motor must not be armed. Discards the target if the
+    /// conditions leave no share of the output.
+    pub(crate) const fn react(&mut self, before: Conditions, left: f32, config: &HealthConfig) {
+        if config.relaxes(before, self.latch.active()) {
+            self.trip();
+        } else if left <= 0.0 {
+            self.relax();
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn vitals_have_the_first_code_of_a_fault_or_the_code_of_a_warning() {
-        let of = |vitals: Vitals| (vitals.has_fault, vitals.has_warning, vitals.error_code);
-        assert_eq!(of(Vitals::of_errors([0, 7, 9], 3)), (true, false, 7));
-        assert_eq!(of(Vitals::of_errors([0, 0], 3)), (false, true, 3));
-        assert_eq!(of(Vitals::of_errors([0, 0], 0)), (false, false, 0));
-    }
 
     #[test]
     fn a_second_master_counts_for_a_second_on_both_sides_of_its_last_command() {

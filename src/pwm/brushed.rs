@@ -6,7 +6,7 @@ use crate::control::Pid;
 use crate::error::ConfigError;
 use crate::motor::{
     ArmError, Capabilities, Capability, Condition, Conditions, Guard, Health, Link, MotorName,
-    Obstacles, OneOf, Repeat, TargetError, VelocityDrive, Vitals, Watch,
+    Obstacles, OneOf, Rest, TargetError, Turn, VelocityDrive, Vitals, Watch,
 };
 use crate::time::{Edge, Instant, Tick, TimeStep};
 use crate::units::AngularVelocity;
@@ -17,7 +17,6 @@ pub use config::BrushedConfig;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Target {
-    Rest,
     Duty(f32),
     Velocity(f32),
 }
@@ -77,7 +76,6 @@ pub struct Brushed<P, D> {
     output: f32,
     /// The last update set a duty of its own; the loop continues from there.
     was_direct: bool,
-    may_repeat: Repeat,
     counted: Option<(u32, Instant)>,
     counts: i64,
     rad_per_s: f32,
@@ -102,11 +100,10 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
             config,
             speed,
             guard: guard.with_timeouts(config.timeouts).with_opening(config.opening),
-            target: Target::Rest,
+            target: Target::Duty(0.0),
             way: Way::Coast,
             output: 0.0,
             was_direct: false,
-            may_repeat: Repeat::NO,
             counted: None,
             counts: 0,
             rad_per_s: 0.0,
@@ -146,21 +143,18 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
         Obstacles::check_one(&mut self.guard, missing)?;
         if self.guard.engage(now) {
             self.watch.start(&mut self.guard, self.config.name, now);
-            self.rest();
         }
         Ok(())
     }
 
     /// Refuses targets until armed again; the next update stops the motor.
-    pub fn disarm(&mut self) {
+    pub const fn disarm(&mut self) {
         self.guard.disarm();
-        self.rest();
     }
 
     /// Disarms; the motor stays disarmed until the stop is cleared and the motor armed.
-    pub fn emergency_stop(&mut self) {
+    pub const fn emergency_stop(&mut self) {
         self.guard.emergency_stop();
-        self.rest();
     }
 
     /// Takes the emergency stop back; the motor stays disarmed.
@@ -179,7 +173,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     /// # Errors
     /// Names the reason of the refusal. A value that is NaN or infinite also removes the present target.
     pub fn set_duty(&mut self, share: f32) -> Result<(), TargetError> {
-        self.admit(share.is_finite())?;
+        self.guard.admit(share.is_finite())?;
         self.target = Target::Duty(share);
         Ok(())
     }
@@ -189,9 +183,15 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     /// # Errors
     /// The error of a pin, the first of the PWM channel, the second of a direction pin; the next call tries again.
     pub fn update(&mut self, tick: Tick) -> Result<(), OneOf<P::Error, D::Error>> {
-        let healthy = self.check(tick.now());
-        let asked = self.command(tick);
-        let limit = self.config.limit * healthy.min(self.guard.share());
+        let step = TimeStep::of_motor(tick.dt_s());
+        let held = self.guard.pass(tick.now(), !step.is_hold());
+        let left = self.check(tick.now());
+        let asked = match self.guard.turn(held) {
+            Turn::Drive => self.drive(step),
+            Turn::Repeat => self.output,
+            Turn::Rest => 0.0,
+        };
+        let limit = self.config.limit * self.guard.share_of(left);
         self.output = asked.max(-limit).min(limit);
         if limit < self.config.limit {
             // The loop knows only the full limit, and would wind up.
@@ -233,18 +233,14 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
         off.and(set)
     }
 
-    fn command(&mut self, tick: Tick) -> f32 {
-        let (drives, step) = (self.guard.drives(tick.now()), TimeStep::of_motor(tick.dt_s()));
-        let may_drive = self.may_repeat.drives(drives, step.is_hold());
-        if !drives {
-            // Late counts leave the integral unchanged; without a target it starts afresh.
-            if !self.guard.has_target() {
-                self.rest();
+    fn drive(&mut self, step: TimeStep) -> f32 {
+        match self.guard.end_rest() {
+            Rest::Relaxed => {
+                self.was_direct = false;
+                self.speed.iter_mut().for_each(Pid::reset);
             }
-            return 0.0;
-        }
-        if step.is_hold() {
-            return if may_drive { self.output } else { 0.0 };
+            Rest::Pause => self.speed.iter_mut().for_each(Pid::interrupt),
+            Rest::None => {}
         }
         let is_direct = matches!(self.target, Target::Duty(_));
         let was_direct = core::mem::replace(&mut self.was_direct, is_direct);
@@ -262,22 +258,8 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
                 }
                 speed.step(goal, self.rad_per_s, &step)
             }
-            (Target::Rest, _) | (Target::Velocity(_), None) => 0.0,
+            (Target::Velocity(_), None) => 0.0,
         }
-    }
-
-    fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
-        self.may_repeat.end_without(self.guard.has_target());
-        if !self.guard.has_target() {
-            // The target before and its output are discarded.
-            (self.target, self.was_direct) = (Target::Rest, false);
-        }
-        self.guard.admit(is_finite)
-    }
-
-    fn rest(&mut self) {
-        (self.target, self.was_direct) = (Target::Rest, false);
-        self.speed.iter_mut().for_each(Pid::reset);
     }
 
     /// Returns the counts since the first reading, in the positive direction; 0 without an encoder.
@@ -368,7 +350,7 @@ impl<P: SetDutyCycle, D: Direction> VelocityDrive<()> for Brushed<P, D> {
         if self.speed.is_none() {
             return Err(TargetError::NoLoop);
         }
-        self.admit(target.as_rad_per_s().is_finite())?;
+        self.guard.admit(target.as_rad_per_s().is_finite())?;
         self.target = Target::Velocity(target.as_rad_per_s());
         Ok(())
     }

@@ -1,7 +1,7 @@
 use crate::error::ConfigError;
 use crate::motor::{
-    ArmError, Capabilities, Capability, Condition, Conditions, Guard, Health, MotorName, OPENING,
-    Obstacles, Repeat, TargetError, Timeouts, VelocityDrive,
+    ArmError, Capabilities, Capability, Condition, Conditions, Guard, Health, Hold, MotorName,
+    OPENING, Obstacles, TargetError, Timeouts, Turn, VelocityDrive,
 };
 use crate::time::{Duration, Edge, Instant, Tick, TimeStep};
 use crate::units::AngularVelocity;
@@ -57,7 +57,8 @@ pub struct RcPwm<P> {
     full_speed: Option<AngularVelocity>,
     arming: Arming,
     throttle: f32,
-    may_repeat: Repeat,
+    /// The last pulse of a target.
+    pulse_us: f32,
 }
 
 /// Where the arming sequence is.
@@ -87,7 +88,7 @@ impl<P: SetDutyCycle> RcPwm<P> {
             full_speed: None,
             arming: Arming::Idle,
             throttle: 0.0,
-            may_repeat: Repeat::ONCE,
+            pulse_us: 0.0,
         }
     }
 
@@ -210,24 +211,24 @@ impl<P: SetDutyCycle> RcPwm<P> {
     /// # Errors
     /// The error of the channel; the next call tries again.
     pub fn update(&mut self, tick: Tick) -> Result<(), P::Error> {
-        let drives = self.guard.drives(tick.now());
-        if !self.guard.knows_time() {
+        let is_hold = TimeStep::new(tick.dt_s(), ANY_STEP_S).is_hold();
+        let held = self.guard.pass(tick.now(), !is_hold);
+        if held == Some(Hold::LoseTime) {
             // Nobody knows for how long neutral was sent.
             self.arming = Arming::Idle;
         }
         if self.arming != Arming::Idle {
             return self.go_on_arming(tick.now());
         }
-        let is_hold = TimeStep::new(tick.dt_s(), ANY_STEP_S).is_hold();
-        // Each pulse is calculated from the present throttle: there is no command of an earlier target to repeat.
-        let may_act = self.may_repeat.drives(true, is_hold);
-        if drives && may_act {
-            let pulse_us = self.pulse_us();
-            self.send(pulse_us)
-        } else if self.off_at_rest {
-            self.channel.set_duty_cycle_fully_off()
-        } else {
-            self.send(self.neutral_us().into())
+        match self.guard.turn(held) {
+            Turn::Drive => {
+                self.guard.end_rest();
+                self.pulse_us = self.pulse_of_target();
+                self.send(self.pulse_us)
+            }
+            Turn::Repeat => self.send(self.pulse_us),
+            Turn::Rest if self.off_at_rest => self.channel.set_duty_cycle_fully_off(),
+            Turn::Rest => self.send(self.neutral_us().into()),
         }
     }
 
@@ -251,7 +252,7 @@ impl<P: SetDutyCycle> RcPwm<P> {
         neutral
     }
 
-    fn pulse_us(&mut self) -> f32 {
+    fn pulse_of_target(&mut self) -> f32 {
         let open = self.guard.share();
         let [low, neutral, high] = self.pulses_us.map(f32::from);
         let reach = if self.throttle < 0.0 { neutral - low } else { high - neutral };

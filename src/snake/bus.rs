@@ -3,9 +3,7 @@ use super::schedule::{self, Answers, count};
 use super::slot::Slot;
 use super::{AttachError, Command, Config, Joint, Joints, Register, State};
 use crate::frame::CanFrame;
-use crate::motor::{
-    BusLoad, Condition, DeviceGuard, Guard, Hold, Ingest, Link, MotorGuard, MotorName, Timeouts,
-};
+use crate::motor::{BusLoad, DeviceGuard, Hold, Ingest, Link, MotorGuard, MotorName, Timeouts};
 use crate::time::{Duration, Instant, Tick, TimeStep};
 use embedded_can::Frame;
 
@@ -153,7 +151,7 @@ impl Joints {
                     return Ingest::Unrelated;
                 }
                 count(&mut counters.foreign_commands);
-                slot.guard.note(Condition::SecondMaster, true, now);
+                slot.guard.hear_rival(now, slot.stall.health());
             }
             None => count(match frame.length() {
                 6 => &mut counters.bad_field,
@@ -170,8 +168,8 @@ impl Joints {
     /// Chooses the joints for requests and writes, and relaxes joints that may not be driven.
     ///
     /// An update that does not lie after the previous one relaxes every joint until armed again. A `dt_s` of zero, below zero, infinite or
-    /// NaN chooses no joint for one update; a second such update in a row relaxes all joints. Frames that disable a joint are sent
-    /// nevertheless.
+    /// NaN chooses no joint for one update; a second such update in a row, or a late one, disables all joints until the next usable step.
+    /// Frames that disable a joint are sent nevertheless.
     ///
     /// Costs 3122 instructions on a Cortex-M4F, for 12 joints, with the frames out and an answer in (`docs/figures.md`).
     pub fn update(&mut self, tick: Tick) {
@@ -179,19 +177,23 @@ impl Joints {
         let has_step = !TimeStep::new(tick.dt_s(), ANY_STEP_S).is_hold();
         let is_quiet = has_step && self.guard.is_quiet(before, tick.now());
         if !is_quiet {
-            if let Err(hold) = self.guard.pass::<MotorGuard>(&mut [], before, has_step, u32::MAX) {
+            if let Some(hold) = self.guard.pass::<MotorGuard>(&mut [], before, has_step, u32::MAX) {
                 return self.hold(hold);
             }
         }
         self.now = tick.now();
         self.give_up(Some(self.reply_timeout));
+        self.update_joints(self.now, None);
+        schedule::plan(self);
+    }
+
+    fn update_joints(&mut self, now: Instant, held: Option<Hold>) {
         for index in 0..SLOTS {
             let Some(slot) = self.slots.get_mut(index) else { continue };
-            if slot.id.is_some() && (slot.update(self.now) || slot.wants_reminder(self.now)) {
+            if slot.id.is_some() && (slot.update(now, held) || slot.wants_reminder(self.now)) {
                 schedule::stop(self, index);
             }
         }
-        schedule::plan(self);
     }
 
     /// Counts overdue replies; without a time-out, all.
@@ -208,35 +210,14 @@ impl Joints {
     fn hold(&mut self, hold: Hold) {
         count(&mut self.counters.bad_steps);
         let now = self.guard.updated();
-        match hold {
-            Hold::Keep => {}
-            Hold::Rest => (0..SLOTS).for_each(|index| self.rest_at(index, Guard::relax)),
-            // Time did not move on, so no age is known.
-            Hold::LoseTime => {
-                (0..SLOTS).for_each(|index| self.rest_at(index, |guard| guard.lose_time(now)));
-            }
-        }
         let stands = now <= self.now;
         self.now = self.now.max(now);
         // A clock that stands or was set back does not show when a reply is overdue: an update then counts for a millisecond.
         let held = Duration::from_millis(self.guard.held_steps().into());
         let is_long = held > self.reply_timeout;
         self.give_up((!(stands && is_long)).then_some(self.reply_timeout));
-        for index in 0..SLOTS {
-            let slot = self.slots.get(index).filter(|slot| slot.id.is_some());
-            if slot.is_some_and(|slot| slot.wants_reminder(self.now)) {
-                schedule::stop(self, index);
-            }
-        }
+        self.update_joints(now, Some(hold));
         schedule::stop_again(self);
-    }
-
-    /// Lets a joint rest, by a change of its guard.
-    pub(super) fn rest_at(&mut self, index: usize, rest: impl FnOnce(&mut Guard)) {
-        if let Some(slot) = self.slots.get_mut(index) {
-            rest(&mut slot.guard);
-        }
-        self.let_go(index);
     }
 
     /// Disables a joint that may no longer be driven. This happens at once: the joint may be armed and have a target again before the next

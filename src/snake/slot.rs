@@ -83,7 +83,7 @@ pub(super) struct Slot {
     resets: u16,
     traffic: Traffic,
     window_from: Instant,
-    stall: Stall,
+    pub(super) stall: Stall,
     stands: Standing,
 }
 
@@ -235,7 +235,7 @@ impl Slot {
     #[inline]
     pub(super) fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
         self.guard.admit(is_finite)?;
-        self.guard.require_zero((self.homing != Homing::Uncertain).then_some(()))
+        self.guard.require_zero((!self.homing.is_uncertain()).then_some(()))
     }
 
     /// Sets a target in pulses from the joint's zero.

@@ -4,7 +4,7 @@ use super::slot::{Offset, Slot, health, to_pulses};
 use super::{AttachError, Config, Joint, Joints, PULSES_PER_TURN, Register};
 use crate::encoder::Position;
 use crate::motor::{
-    Capabilities, Capability, Condition, Conditions, Guard, Health, MotorName, TargetError,
+    Capabilities, Capability, Condition, Conditions, Health, MotorName, TargetError,
 };
 use crate::time::Edge;
 use crate::units::AngularVelocity;
@@ -70,9 +70,9 @@ impl Joints {
 
     /// Discards the target of a joint: the joint is disabled, and stays armed.
     pub fn relax(&mut self, joint: Joint) {
-        if self.slot(joint).is_some() {
-            self.rest_at(joint.index(), Guard::relax);
-        }
+        let Some(slot) = self.slot_mut(joint) else { return };
+        slot.guard.relax();
+        self.let_go(joint.index());
     }
 
     /// Makes the present position of a joint zero. A joint with a target is relaxed: the target refers to the old zero.

@@ -15,7 +15,7 @@ fn found_with(file: &str, lines: &str) -> Vec<String> {
 }
 
 /// File, and a rule.
-const RULES: [(&str, &str); 46] = [
+const RULES: [(&str, &str); 48] = [
     // A motor trips by a flag.
     (
         "motor/actuator/update.rs",
@@ -103,6 +103,15 @@ const RULES: [(&str, &str); 46] = [
     (
         "pwm/rc.rs",
         "enum Waits { No, From(Instant) }\nfn f(waits: Waits, end: Instant) -> bool { match waits { Waits::From(at) => end > at, Waits::No => false } }",
+    ),
+    // An update without a usable step, a fault.
+    (
+        "vesc/bus.rs",
+        "fn f(order: Order, last: CanFrame) -> CanFrame { if order.step.is_hold() { last } else { rest() } }",
+    ),
+    (
+        "pwm/rc.rs",
+        "impl RcPwm { fn f(&mut self, is_wrong: bool, now: Instant) { if is_wrong { self.guard.fail(now, &USUAL) } } }",
     ),
     // Time in steps, and updates that are counted.
     (
@@ -206,8 +215,8 @@ const OTHERS: [(&str, &str); 10] = [
         "fn f(motors: &mut Motors<8>, now: Instant) -> bool { let before = motors.guard.begin(now); motors.guard.is_quiet(before, now) }",
     ),
     (
-        "dji/slot.rs",
-        "fn f(slot: &mut Slot, now: u32) -> Result<(), ArmError> { slot.guard.engage(now); Ok(()) }",
+        "dji/watch.rs",
+        "fn f(slot: &mut Slot, hold: Hold) -> bool { slot.guard.turn(Some(hold)) == Turn::Repeat }",
     ),
     (
         "snake/bus.rs",

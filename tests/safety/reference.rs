@@ -14,8 +14,9 @@ use opening::Opening;
 pub(super) use opening::Opens;
 use rival::Rival;
 pub(super) use rival::Rivals;
-pub(super) use rules::{BadStep, Bounds, Refusal, Rules, Setup};
+pub(super) use rules::{Bounds, Refusal, Rules, Setup};
 
+const LATE_US: u64 = 10_000;
 const DEADLINE_US: u64 = 100_000;
 const OFFLINE_US: u64 = 100_000;
 const PAUSE_US: u64 = 100_000;
@@ -195,8 +196,7 @@ impl Reference {
         let is_lost = |link| matches!(link, Link::Late | Link::Recovering | Link::Offline);
         let now = self.device_updated.unwrap_or(0);
         let is_ahead = self.is_far_ahead(now) && link == Link::Offline;
-        let is_old = now > self.heard.saturating_add(TOLD_US)
-            && self.rules.bad_step == BadStep::RepeatsThenRelaxes;
+        let is_old = now > self.heard.saturating_add(TOLD_US) && self.rules.is_joint;
         if is_lost(link) && is_lost(self.link) && (is_ahead || is_old) {
             self.link = link;
             let is_lost = link != Link::Late;
@@ -224,16 +224,21 @@ impl Reference {
             (true, Arming::Armed, Link::Online) => Ok(()),
             (true, Arming::Armed, _) => Err(TargetError::NoFeedback),
         };
-        if outcome.is_ok() {
-            (self.target, self.value) = (Some(self.target_time), value.into());
-        } else {
-            // No older target acts in its place.
-            self.relax();
+        // No older target acts in the place of a refused one.
+        match outcome {
+            Ok(()) => (self.target, self.value) = (Some(self.target_time), value.into()),
+            Err(TargetError::NoFeedback) => self.cancel(),
+            Err(_) => self.relax(),
         }
         outcome
     }
 
     pub(super) fn relax(&mut self) {
+        self.cancel();
+        self.has_rested = true;
+    }
+
+    fn cancel(&mut self) {
         (self.target, self.may_repeat) = (None, false);
     }
 
@@ -242,13 +247,9 @@ impl Reference {
     /// Returns the output of the motor if it is driven in this update.
     pub(super) fn update(&mut self, now: u64, has_step: bool) -> Option<Bounds> {
         self.edges.begin_call();
-        let is_shielded = self.rules.bad_step == BadStep::RepeatsThenRelaxes;
+        let has_step = has_step || !self.rules.has_steps;
         let device_before = self.device_updated.replace(now);
         let device_moves_on = device_before.is_none_or(|before| before < now);
-        self.is_seen = false;
-        if is_shielded && device_moves_on && !has_step {
-            return self.update_unseen(device_before.unwrap_or(0), now).then_some(self.bounds);
-        }
         let before = core::mem::replace(&mut self.updated, now);
         let was_running = core::mem::replace(&mut self.is_running, true);
         self.is_target_ahead = self.target.is_some_and(|set| set > now.saturating_add(TOLD_US));
@@ -256,26 +257,23 @@ impl Reference {
         self.target_time = now;
         let step = if was_running { now.saturating_sub(before) } else { 0 };
         self.quiet_us = if moves_on { self.quiet_us + step.min(LONGEST_STEP_US) } else { 0 };
-        let loses_time = !moves_on || is_shielded && !device_moves_on;
-        let takes_turns = self.rules.bad_step == BadStep::Repeats;
-        // Where ages are compared anyway, a motor is offline for its age, and no target of it is forgotten.
-        let is_compared = !loses_time && (has_step || !takes_turns);
+        let loses_time = !moves_on || self.rules.is_joint && !device_moves_on;
         // Before its first update, a motor without feedback has no other time.
         let since = before.max(self.armed_at);
         let is_pause = now.saturating_sub(since) > LONGEST_PAUSE_US;
-        if !loses_time && (is_pause || !is_compared) {
-            self.forget_after_a_pause(since, now);
-        }
         if loses_time {
             self.lose_time(now);
-        }
-        if is_compared {
-            self.age(now);
-            if takes_turns {
-                self.take_turn(now);
-            } else {
-                self.end_what_is_over(now);
+        } else {
+            if is_pause {
+                self.forget_after_a_pause(since, now);
             }
+            self.age(now);
+        }
+        let is_usable = has_step && !loses_time;
+        if is_usable && self.rules.takes_turns {
+            self.take_turn(now);
+        } else if is_usable {
+            self.end_what_is_over(now);
         }
         self.is_seen = device_moves_on;
         if core::mem::take(&mut self.arms_with_update) {
@@ -284,36 +282,18 @@ impl Reference {
             }
             return None;
         }
-        let is_usable = has_step && (device_moves_on || !is_shielded);
         self.bad_steps = if is_usable { 0 } else { self.bad_steps + 1 };
         let may_drive = self.is_armed() && self.link == Link::Online && self.target.is_some();
         let may_repeat = core::mem::replace(&mut self.may_repeat, has_step && may_drive);
         self.has_rested |= self.target.is_none();
-        let drives = match self.rules.bad_step {
-            _ if has_step => may_drive,
-            BadStep::Unknown => may_drive,
-            BadStep::Repeats => may_repeat && !self.is_late_step(before, now),
-            BadStep::OpenLoop => may_drive && self.bad_steps == 1,
-            BadStep::Ages | BadStep::RepeatsThenRelaxes => may_drive && may_repeat,
-        };
-        let goes_on = matches!(self.rules.bad_step, BadStep::OpenLoop | BadStep::Unknown);
-        if drives && (has_step || goes_on) {
+        // The last command once more, in the first update without a usable step that is not late itself.
+        let late_us = self.rules.late_us.unwrap_or(LATE_US);
+        let repeats = may_repeat && self.bad_steps == 1 && now.saturating_sub(before) <= late_us;
+        let drives = may_drive && (is_usable || repeats);
+        if drives && is_usable {
             self.bounds = self.predict(now);
         }
         drives.then_some(self.bounds)
-    }
-
-    fn is_late_step(&self, before: u64, now: u64) -> bool {
-        self.rules.late_us.is_some_and(|late_us| now - before > late_us)
-    }
-
-    /// An update without a usable step that the motor does not see, its device alone.
-    fn update_unseen(&mut self, before: u64, now: u64) -> bool {
-        self.bad_steps += 1;
-        if self.bad_steps > 1 || self.is_late_step(before, now) {
-            self.relax();
-        }
-        core::mem::take(&mut self.may_repeat)
     }
 
     /// No age is known: the motor rests, and is not heard until the next feedback.

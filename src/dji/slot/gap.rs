@@ -91,6 +91,14 @@ fn doubt_position(slot: &mut Slot) {
     slot.require_check();
     if slot.homing == Homing::Homed && !slot.shaft.is_direct() {
         slot.homing = Homing::Uncertain;
+        drop_way(slot);
+    }
+}
+
+/// Discards a target from the zero before.
+fn drop_way(slot: &mut Slot) {
+    if slot.asked.is_way() {
+        slot.relax();
     }
 }
 
@@ -106,9 +114,7 @@ pub(in crate::dji) fn set_present_position(
     if !position.is_finite() {
         return Err(TargetError::NotFinite);
     }
-    if slot.asked.is_way() {
-        slot.relax();
-    }
+    drop_way(slot);
     slot.shaft.set_position(position);
     slot.homing = Homing::Homed;
     slot.guard.latch.set(Condition::PositionUncertain, false);

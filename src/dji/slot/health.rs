@@ -113,15 +113,16 @@ pub(in crate::dji) fn check(slot: &mut Slot, seen: &Surroundings) {
     if !before.is_empty() {
         slot.guard.end_what_is_over(seen.is_alone);
     }
+    let mut left = 1.0;
     if slot.guard.link() == Link::Online {
-        let share = run_checks(slot, facts, seen);
-        narrow(slot, share, seen.elapsed, seen.now);
+        left = run_checks(slot, facts, seen);
+        narrow(slot, left, seen.elapsed, seen.now);
     } else {
         slot.monitor = Monitor::NEW;
     }
     if !slot.guard.latch.active().is_empty() || slot.error_code != 0 {
         slot.require_check();
-        slot.guard.react(before, slot.health);
+        slot.guard.react(before, left, slot.health);
     } else if slot.cool_below == 0 {
         waive_check(slot, facts);
     }
@@ -138,7 +139,7 @@ pub(in crate::dji) fn hear_error(slot: &mut Slot, facts: &Facts, code: u8) {
         let before = slot.guard.latch.active();
         take_error(slot, facts, code);
         slot.require_check();
-        slot.guard.react(before, slot.health);
+        slot.guard.react(before, 1.0, slot.health);
     }
 }
 
@@ -234,9 +235,8 @@ pub(in crate::dji) fn is_fit(slot: &Slot) -> bool {
     slot.facts.is_some() && unfit(slot).is_none()
 }
 
-/// Takes targets from now on, beginning at rest. A condition that relaxed the motor is detected anew.
-pub(in crate::dji) fn engage(slot: &mut Slot, now: u32) {
-    slot.guard.engage(now);
+/// Begins as the motor is armed. A condition that relaxed the motor is detected anew.
+pub(in crate::dji) fn start(slot: &mut Slot, now: u32) {
     slot.monitor.start(&mut slot.guard.latch);
     keep_inside(slot, now);
 }
@@ -258,7 +258,7 @@ fn soft_limits(slot: &mut Slot, ahead: u8) -> (bool, bool) {
 fn close_window(slot: &mut Slot, window: u16, feedback_hz: u32) {
     let was_crowded = slot.traffic.is_crowded();
     let double = slot.traffic.is_double();
-    slot.traffic.add(slot.guard.take_in_time());
+    slot.traffic.add(slot.guard.in_time.take());
     slot.traffic.close(window, feedback_hz);
     if slot.traffic.is_crowded() {
         // Every frame is compared from now on.
@@ -291,8 +291,8 @@ pub(in crate::dji) fn state(slot: &Slot) -> Option<State> {
         error: facts.errors.read(slot.feedback.error()),
         rotor_counts: slot.shaft.rotor_counts(),
         ambiguous_gaps: slot.ambiguous_gaps,
-        refused_targets: slot.guard.refused_targets(),
-        forgotten_targets: slot.guard.forgotten_targets(),
+        refused_targets: slot.guard.refused_targets,
+        forgotten_targets: slot.guard.forgotten_targets,
         conditions: slot.guard.latch.active(),
         link: slot.guard.link(),
         feedback: slot.feedback,
@@ -314,8 +314,8 @@ pub(in crate::dji) fn report(slot: &Slot) -> Option<Health> {
         temperature_c: (heard && facts.has_temperature).then_some(celsius),
         error_code: slot.error_code,
         saturated: slot.saturated,
-        refused_targets: slot.guard.refused_targets(),
-        forgotten_targets: slot.guard.forgotten_targets(),
+        refused_targets: slot.guard.refused_targets,
+        forgotten_targets: slot.guard.forgotten_targets,
         ambiguous_gaps: slot.ambiguous_gaps,
     })
 }

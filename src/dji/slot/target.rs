@@ -44,6 +44,7 @@ impl Slot {
     ) -> Result<(), TargetError> {
         needs(self.has_position_loop())?;
         self.admit(position.is_finite())?;
+        let position = self.require_zero(position, !self.homing.is_uncertain())?;
         let (turns, phase) = self.shaft.locate(self.inside(position));
         let goal = Goal { turns: self.shaft.near(turns), value: phase };
         self.start(Action::Position, goal, now);
@@ -75,6 +76,12 @@ impl Slot {
             Ok(()) => Ok(()),
             Err(error) => Err(self.refuse(error)),
         }
+    }
+
+    /// Refuses a target from a zero that is not known.
+    fn require_zero(&mut self, target: Position, is_known: bool) -> Result<Position, TargetError> {
+        let target = is_known.then_some(target);
+        self.guard.require_zero(target).map_err(|error| self.refuse(error))
     }
 
     #[inline]
@@ -111,8 +118,7 @@ impl Slot {
     ) -> Result<(), TargetError> {
         needs(self.has_position_loop())?;
         self.admit(angle.is_finite())?;
-        let angle = self.homing.is_known().then_some(angle);
-        let angle = self.guard.require_zero(angle).map_err(|error| self.refuse(error))?;
+        let angle = self.require_zero(angle, self.homing.is_known())?;
         let (_, phase) = self.shaft.locate(angle);
         self.start(Action::Angle, Goal::of(phase), now);
         Ok(())
@@ -153,12 +159,6 @@ impl Slot {
         self.apply_rules();
     }
 
-    /// Tells whether the motor was at rest, without a target or fresh feedback, at any time since the last usable update: the command of
-    /// that update must not be sent again.
-    pub(in crate::dji) fn has_rested(&self) -> bool {
-        matches!(self.duty, Duty::Rest | Duty::First)
-    }
-
     /// Determines the task of an update. Call this wherever the guard, the range, a loop or the action changes.
     pub(in crate::dji) fn apply_rules(&mut self) {
         if !self.guard.has_target() {
@@ -172,7 +172,7 @@ impl Slot {
             && self.health.soft_limits.is_none();
         self.duty = match self.asked {
             _ if !self.guard.drives() => Duty::Rest,
-            _ if self.has_rested() => Duty::First,
+            _ if self.guard.has_rested() => Duty::First,
             _ if self.acted != self.asked => Duty::Other,
             Action::Raw => Duty::Raw,
             Action::Velocity if is_free => Duty::Velocity,

@@ -125,6 +125,33 @@ fn a_gap_that_cannot_be_resolved_is_flagged_and_unhomes() {
     assert_eq!((state.ambiguous_gaps, state.homing), (1, Homing::Uncertain));
 }
 
+/// A gap of 80 ms at 9000 rpm: the zero is in doubt by whole turns of the rotor.
+#[test]
+fn a_position_from_a_zero_in_doubt_is_refused_and_a_velocity_is_taken() {
+    let config = Config::<M3508>::at_once(1).position_loop(SPEED, SPEED);
+    let (mut bus, [wheel]) = armed([config]);
+    let goal = Position::from_turns(3);
+    bus.set_position(wheel, goal).unwrap(); // relative to where it was switched on
+    bus.zero(wheel).unwrap();
+    bus.set_position(wheel, goal).unwrap();
+    step(&mut bus, 2);
+    assert!(sent(&mut bus).iter().any(|(_, [word, ..])| *word > 0));
+    assert_eq!(bus.ingest(&feedback(0x201, 0, 9000), at_ms(3)), Ingest::Taken);
+    assert_eq!(bus.ingest(&feedback(0x201, 17, 9000), at_ms(83)), Ingest::Taken);
+    assert_eq!(bus.state(wheel).unwrap().homing, Homing::Uncertain);
+    step(&mut bus, 84);
+    assert!(sent(&mut bus).iter().all(|(_, words)| *words == [0; 4]), "the target is of the zero");
+    assert_eq!(bus.set_position(wheel, goal), Err(TargetError::NotHomed));
+    assert_eq!(bus.set_velocity(wheel, AngularVelocity::from_rpm(900.0)), Ok(()));
+    step(&mut bus, 85);
+    assert!(sent(&mut bus).iter().any(|(_, [word, ..])| *word != 0));
+    assert_eq!(bus.set_position(wheel, goal), Err(TargetError::NotHomed));
+    step(&mut bus, 86);
+    assert!(sent(&mut bus).iter().all(|(_, words)| *words == [0; 4]), "no older target either");
+    bus.zero(wheel).unwrap();
+    assert_eq!(bus.set_position(wheel, goal), Ok(()));
+}
+
 #[test]
 fn frames_of_one_motor_are_handled_in_order() {
     let mut bus = Bus::new();

@@ -4,7 +4,7 @@ use super::{Actuator, DriveProtocol, Offered, Order, Target};
 use crate::frame::CanFrame;
 use crate::motor::{
     AngleDrive, CanDevice, Capabilities, Capability, Claim, Condition, Conditions, Devices, Ingest,
-    MotorName, Repeat, TargetError, VelocityDrive, Visitor, WrongSetting,
+    MotorName, TargetError, VelocityDrive, Visitor, WrongSetting,
 };
 use crate::time::{Edge, Instant, Tick, TimeStep};
 use crate::units::{Angle, AngularVelocity};
@@ -25,16 +25,14 @@ impl<M: DriveProtocol> CanDevice for Actuator<M> {
     #[inline]
     fn update(&mut self, tick: Tick) {
         let (step, now) = (TimeStep::of_motor(tick.dt_s()), tick.now());
-        let goes_on = self.is_steady && !step.is_hold() && self.goes_on(now);
+        let goes_on = self.goes_on(step, now);
         if goes_on || self.decide(step, now) {
             if self.offered.waits {
                 self.withdraw();
             }
             let target = if goes_on { self.target } else { self.goal };
             let frame = Some(self.motor.control(Order { target, share: self.share, step }));
-            let may_repeat = Repeat::ONCE;
-            self.offered =
-                Offered { frame, waits: true, may_wait: true, may_repeat, is_rest: false };
+            self.offered = Offered { frame, waits: true, may_wait: true, is_rest: false };
         }
     }
 

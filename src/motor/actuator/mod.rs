@@ -23,8 +23,8 @@ pub(crate) use registers::{
 pub(crate) use settings::{Inquiry, Preparation, Settings, TimeoutUnits};
 
 use super::{
-    BusLoad, Capability, Claim, Condition, Guard, Health, HealthConfig, Link, Repeat, Route,
-    TargetError, Timeouts, Watch,
+    BusLoad, Capability, Claim, Condition, Guard, Health, HealthConfig, Link, Route, TargetError,
+    Timeouts, Watch,
 };
 use crate::control::PidConfig;
 use crate::error::{ConfigError, finite};
@@ -381,13 +381,10 @@ struct Offered {
     waits: bool,
     /// This frame may wait, or one for the drive's power.
     may_wait: bool,
-    /// A command, which an update without a step may send once more.
-    may_repeat: Repeat,
     /// Rest, not given back by the driver.
     is_rest: bool,
 }
 
 impl Offered {
-    const NOTHING: Self =
-        Self { frame: None, waits: false, may_wait: false, may_repeat: Repeat::NO, is_rest: false };
+    const NOTHING: Self = Self { frame: None, waits: false, may_wait: false, is_rest: false };
 }

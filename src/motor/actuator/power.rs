@@ -1,6 +1,6 @@
 //! The supply and the power of the drive of an actuator: whether the drive is enabled, and a jump of its angle.
 
-use crate::motor::furthest;
+use crate::encoder::furthest;
 use crate::time::{Duration, Instant};
 use crate::units::{Angle, AngularVelocity};
 

@@ -5,7 +5,7 @@ use super::power::Reading;
 use super::{Actuator, DriveProtocol, INQUIRY, Impedance, Target};
 use crate::frame::CanFrame;
 use crate::motor::guard::SILENCE_US;
-use crate::motor::{Capability, Claim, Ingest, Link, Repeat, Route, TargetError, Vitals};
+use crate::motor::{Capability, Claim, Ingest, Link, Rest, Route, TargetError, Turn, Vitals};
 use crate::time::{Instant, TimeStep};
 use embedded_can::Frame;
 
@@ -38,7 +38,7 @@ impl<M: DriveProtocol> Actuator<M> {
         self.guard.hear(now);
         let has_reset = self.power.hear(self.motor.is_enabled(), now);
         if has_reset {
-            self.fail(now);
+            self.watch.fail(&mut self.guard, now);
         }
         let gap_us = gap_us.unwrap_or(0);
         let is_silence = self.guard.is_silence(gap_us);
@@ -61,14 +61,11 @@ impl<M: DriveProtocol> Actuator<M> {
         let (velocity, at) = (self.motor.velocity(), now.stamp());
         let reading = self.motor.angle().map(|angle| Reading { angle, velocity, at });
         match self.joint.follow(reading, at, gap_us, is_silence) {
-            None => {
-                self.guard.lose_zero(now);
-                self.fail(now);
-            }
+            None => self.guard.lose_zero(now),
             Some(turns) if turns.as_radians() != 0.0 => {
                 self.target = self.target.moved(turns);
                 self.start.turn(turns);
-                self.offered.may_repeat = Repeat::NO;
+                self.guard.pause();
             }
             Some(_) => {}
         }
@@ -105,13 +102,6 @@ impl<M: DriveProtocol> Actuator<M> {
         }
     }
 
-    /// Trips the motor as by a fault that the drive reports in one update.
-    fn fail(&mut self, now: Instant) {
-        let vitals = Vitals { has_fault: true, ..self.motor.vitals() };
-        _ = self.watch.check(&mut self.guard, || vitals, now);
-        self.guard.relax_until_armed();
-    }
-
     /// Sets the torque of the output shaft in Nm; positive is counter-clockwise.
     ///
     /// # Errors
@@ -140,8 +130,8 @@ impl<M: DriveProtocol> Actuator<M> {
                 return Err(TargetError::Unsupported);
             }
             self.kind = kind;
-            // Where there was no target, the command is of one before.
-            self.offered.may_repeat.end_without(self.guard.has_target());
+            // Where there was no target, the loops start afresh.
+            self.is_steady = false;
         }
         self.guard.admit(!matches!(target, Err(TargetError::NotFinite)))?;
         self.target = self.guard.require_zero(target.ok())?;
@@ -152,7 +142,10 @@ impl<M: DriveProtocol> Actuator<M> {
 impl<M: DriveProtocol> Actuator<M> {
     /// Moves on to a tick in which the rules have nothing to change; otherwise returns `false`, and moves nothing.
     #[inline]
-    pub(super) fn goes_on(&mut self, now: Instant) -> bool {
+    pub(super) fn goes_on(&mut self, step: TimeStep, now: Instant) -> bool {
+        if !self.is_steady || step.is_hold() {
+            return false;
+        }
         let Vitals { has_fault, has_warning, .. } = self.motor.vitals();
         !has_fault && !has_warning && self.guard.goes_on(now)
     }
@@ -167,9 +160,10 @@ impl<M: DriveProtocol> Actuator<M> {
             self.guard.relax();
         }
         self.place_zero();
+        let held = self.guard.pass(now, !step.is_hold());
         let left = self.check(now);
-        let drives = self.guard.drives(now);
-        if drives && !step.is_hold() {
+        let turn = self.guard.turn(held);
+        if turn == Turn::Drive {
             if was_steady {
                 self.keep_on(left, true);
                 return true;
@@ -180,7 +174,7 @@ impl<M: DriveProtocol> Actuator<M> {
                 return true;
             }
         }
-        let may_drive = drives && self.offered.may_repeat.admits(step.is_hold());
+        let may_drive = turn != Turn::Rest;
         // A question that is given back from now on did not enable the drive, and rest that nobody took was not sent.
         self.switched.take_if(|_| self.power.is_confirmed() && self.switching.is_none());
         self.offered.is_rest &= !self.offered.waits;
@@ -198,7 +192,7 @@ impl<M: DriveProtocol> Actuator<M> {
         self.offered.is_rest &= !was_on || self.power.is_on();
         let inquiry = self.inquire(now);
         let is_at_rest = !may_drive || !self.power.is_ready();
-        if !is_at_rest && !step.is_hold() {
+        if !is_at_rest && turn == Turn::Drive {
             self.follow(left, step);
             return true;
         }
@@ -220,17 +214,20 @@ impl<M: DriveProtocol> Actuator<M> {
 
     /// Finds what the drive is told of the target, and the share of the output, of which the conditions leave so much.
     fn follow(&mut self, left: f32, step: TimeStep) {
+        if self.guard.end_rest() == Rest::Relaxed {
+            self.relax();
+        }
         // Without an earlier command nothing is known of the load.
         if core::mem::take(&mut self.is_resting) {
             self.reopen();
         }
-        let opened = self.guard.share();
+        let (opened, share) = (self.guard.share(), self.guard.share_of(left));
         if opened < 1.0 || self.watch.soft_limits().is_some() {
-            self.share = if left < opened { left } else { opened };
+            self.share = share;
             self.narrow(opened, step);
             return;
         }
-        self.keep_on(left, self.has_nothing_due() && !self.joint.awaits_zero());
+        self.keep_on(share, self.has_nothing_due() && !self.joint.awaits_zero());
     }
 
     /// Lets so much of the output, until the slow quantities are due. Of a `settled` motor a condition alone unsettles the next update.
@@ -253,9 +250,6 @@ impl<M: DriveProtocol> Actuator<M> {
     /// Checks the health of the motor and takes the reactions, which may relax the motor; returns the share of the output left.
     pub(super) fn check(&mut self, now: Instant) -> f32 {
         let share = self.watch.check(&mut self.guard, || self.motor.vitals(), now);
-        if share <= 0.0 {
-            self.guard.relax();
-        }
         if self.watch.soft_limits().is_some() && self.is_online() {
             self.check_limits(now);
         }
@@ -312,7 +306,7 @@ impl<M: DriveProtocol> Actuator<M> {
 
     fn enable(&mut self, now: Instant) {
         if self.motor.wrong_setting().is_some_and(|wrong| wrong.found.is_some()) {
-            self.fail(now);
+            self.watch.fail(&mut self.guard, now);
             return;
         }
         // Of several frames none is left out: the one before still waits for the bus.

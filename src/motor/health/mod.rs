@@ -27,6 +27,7 @@ mod config;
 mod edge;
 mod monitor;
 mod traffic;
+mod vitals;
 
 use super::{Link, MotorName};
 use crate::time::Duration;
@@ -37,6 +38,7 @@ pub(crate) use monitor::{
     BACK, BRAKING_S, Monitor, Sample, check_soft_limits, elapsed, velocity_inside,
 };
 pub(crate) use traffic::{Answers, Traffic};
+pub use vitals::Vitals;
 
 /// State and statistics of a motor, in one line of a log.
 ///

@@ -94,22 +94,23 @@ impl<const N: usize> DeviceGuard<N> {
     }
 
     /// Decides whether an update outside of a [quiet](Self::is_quiet) time, `before` being the time of the previous one, has a usable time
-    /// and step. If so, applies all due time-outs, and computes until when none is due again; otherwise returns the [`Hold`].
+    /// and step, and applies all due time-outs. If so, computes until when none is due again; if not, returns the [`Hold`].
     pub(crate) fn pass<M: Guarded>(
         &mut self,
         motors: &mut [M],
         before: Instant,
         has_step: bool,
         longest_us: u32,
-    ) -> Result<(), Hold> {
+    ) -> Option<Hold> {
         if !self.moves_on(before) {
-            return Err(self.lose_time(motors, before));
+            return Some(self.lose_time(motors, before));
         }
-        if !has_step || self.is_pause(before) {
+        if self.is_pause(before) {
             self.forget_bygones(motors, before);
         }
         if !has_step {
-            return Err(self.hold(before));
+            self.expire(motors);
+            return Some(self.hold(before));
         }
         self.is_running = true;
         self.held_steps = 0;
@@ -119,7 +120,7 @@ impl<const N: usize> DeviceGuard<N> {
             Some(quiet) => self.quiet_until = self.updated + quiet,
             None => self.expire(motors),
         }
-        Ok(())
+        None
     }
 
     /// Tells whether the present update lies after the previous one, and not before the arming; otherwise all ages are meaningless.
@@ -278,29 +279,40 @@ impl<const N: usize> DeviceGuard<N> {
         self.gesture.ask()
     }
 
-    /// Tells whether motors may be [engaged](MotorGuard::engage) at `now`: neither while the emergency stop is set, nor without a request
-    /// that counts. If so, ends the trip.
-    pub(crate) fn begin_arming(&mut self, now: Instant) -> bool {
-        if self.is_stopped || !self.gesture.take() {
+    /// Arms each chosen motor that is online and not armed yet, and lets each `begin`; an armed motor goes on undisturbed. While the emergency stop
+    /// is set, or without a request that counts, no motor is armed. Otherwise the trip ends, unless a motor still waits to be armed. Returns
+    /// whether a motor was armed.
+    pub(crate) fn engage<M: Guarded>(
+        &mut self,
+        motors: &mut [M],
+        now: Instant,
+        is_chosen: impl Fn(u8, &M) -> bool,
+        begin: impl Fn(&mut M),
+    ) -> bool {
+        let waits = |device: &Self, index, motor: &mut M| {
+            let is_chosen = is_chosen(index, motor);
+            is_chosen && !motor.guard().is_armed() && !device.misses(motor.guard(), now)
+        };
+        let has_waiting = (0..).zip(&mut *motors).any(|(index, motor)| waits(self, index, motor));
+        if !has_waiting || self.is_stopped || !self.gesture.take() {
             return false;
         }
         self.now = now.stamp();
         // An arming at an earlier time changes nothing: running motors may have targets of the later one.
         self.armed_at = self.armed_at.max(now);
         self.disturb();
-        true
-    }
-
-    /// Tells whether a motor may be [engaged](MotorGuard::engage): online, and not armed yet. An armed motor goes on undisturbed.
-    pub(crate) fn may_engage(&self, motor: &MotorGuard, now: Instant) -> bool {
-        !motor.is_armed() && !self.misses(motor, now)
-    }
-
-    /// Ends an arming: the trip goes on if a motor still waits to be armed.
-    pub(crate) fn end_arming<M: Guarded>(&mut self, motors: &mut [M]) {
+        for (index, motor) in (0..).zip(&mut *motors) {
+            if waits(self, index, motor) {
+                self.change(motor, index, now, |motor| {
+                    motor.guard().engage(now.stamp());
+                    begin(motor);
+                });
+            }
+        }
         if motors.iter_mut().any(|motor| motor.guard().is_tripped()) {
             (self.gesture.tripped, self.gesture.granted) = (true, false);
         }
+        true
     }
 
     /// Begins the pause after a trip. Each update counts towards it.

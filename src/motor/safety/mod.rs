@@ -6,15 +6,17 @@
 //! | question | decided by | if not |
 //! |---|---|---|
 //! | did time move on since the previous update, and is the update not before the arming? | `DeviceGuard::pass` | zeros in this cycle, all motors trip |
-//! | is the time step usable? | `DeviceGuard::pass`, [`Repeat`] | the last commands once, then zeros |
 //! | is the feedback fresh? | `MotorGuard::age` | late: zero until the next feedback; offline: relaxed and latched |
-//! | is the motor armed, by a gesture? | `MotorGuard::admit`, `DeviceGuard::begin_arming` | no target is taken |
 //! | is there a target that is not expired? | `MotorGuard::age` | relaxed |
+//! | is the time step usable? | `DeviceGuard::pass` | [`Hold`]: the last command once, then zeros |
+//! | is the motor healthy? | `MotorGuard::judge`, `MotorGuard::react` | tripped, as configured; relaxed if no share of the output is left |
+//! | is the motor armed, by a gesture? | `MotorGuard::admit`, `DeviceGuard::engage` | no target is taken |
 //! | does a target from a zero have that zero? | `MotorGuard::require_zero` | relaxed, and the target is not taken |
+//! | does the motor go on from its last command? | `MotorGuard::turn`, `MotorGuard::end_rest` | no command is repeated, and the loops start afresh |
 //! | how far is the output range open, and which of its directions? | `MotorGuard::range` | that share of the full command |
 //!
-//! An [`Actuator`](super::Actuator) and a motor of `pwm` check their health before an update asks these questions, and ask for the share and [`Repeat`]
-//! where a bus of `dji` asks for the range and [`Hold`].
+//! Ages are compared in each update whose time moved on, with a usable step or without. The first of some updates in a row without a usable step repeats
+//! the last command of a motor without a rest since, unless the update itself is late.
 //!
 //! The [health](super::HealthConfig) of a family finds faults, heat and a stall, and says what a second master does; each acts by
 //! [`MotorGuard::trip`]. [`DeviceGuard::is_alone`] says when a second master is gone. The tables of links and of arming, with all
@@ -67,33 +69,15 @@ pub(crate) enum Hold {
     LoseTime,
 }
 
-/// Whether an update without a usable step may repeat the last command: the first after a command, and no other.
+/// Action of an update for a motor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Repeat(bool);
-
-impl Repeat {
-    /// There is no command to repeat.
-    pub(crate) const NO: Self = Self(false);
-    /// The last update gave a command.
-    pub(crate) const ONCE: Self = Self(true);
-
-    /// Tells whether an update may give a command: with a usable step, or once without.
-    pub(crate) const fn admits(self, is_hold: bool) -> bool {
-        !is_hold || self.0
-    }
-
-    /// Tells whether an update may drive the motor, and notes the update.
-    #[cfg(feature = "hal")]
-    pub(crate) const fn drives(&mut self, may_drive: bool, is_hold: bool) -> bool {
-        let drives = may_drive && self.admits(is_hold);
-        *self = Self(drives && !is_hold);
-        drives
-    }
-
-    /// Allows no repetition if there is no target: the command is of an earlier one.
-    pub(crate) const fn end_without(&mut self, has_target: bool) {
-        self.0 &= has_target;
-    }
+pub(crate) enum Turn {
+    /// Run its loops.
+    Drive,
+    /// Send its last command once more.
+    Repeat,
+    /// Send rest.
+    Rest,
 }
 
 /// Time after the last command of another node from which there is no second master.

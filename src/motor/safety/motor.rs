@@ -1,14 +1,9 @@
 //! Rules of one motor.
 
-use super::{Arming, LONGEST_PAUSE_US, Rest};
+use super::{Arming, Hold, LONGEST_PAUSE_US, Rest, Turn};
 use crate::math::limited;
-use crate::motor::{Condition, Latch, Latched, Link, TargetError, Timeouts, age, is_near};
+use crate::motor::{Condition, InTime, Latch, Latched, Link, TargetError, Timeouts, age, is_near};
 use crate::time::Duration;
-
-/// Counts up to 32 767, or 4 s of a bus full of frames of one motor. The count is taken each second. Each overflow would lengthen the gap
-/// by 1 µs, for a minute at most: after a longer pause between two updates no age is known.
-const COUNT_BITS: u32 = 15;
-const COUNT: u32 = (1 << COUNT_BITS) - 1;
 
 /// Decides whether one motor may be driven. See the [module](super) for its states.
 #[derive(Debug, Clone, Copy)]
@@ -17,9 +12,8 @@ const COUNT: u32 = (1 << COUNT_BITS) - 1;
 pub(crate) struct MotorGuard {
     /// Stamp of the last feedback.
     pub(super) heard: u32,
-    /// Trusted gap in µs, 0 unless online: feedback after a shorter gap needs no further check. The lower [`COUNT_BITS`] bits count such
-    /// feedback, so gap and count are one word to load and to store.
-    in_time: u32,
+    /// Feedback in time, after the trusted gap, which is 0 unless online.
+    pub(crate) in_time: InTime,
     /// Stamp of the target.
     pub(super) commanded: u32,
     pub(super) link: Link,
@@ -36,8 +30,8 @@ pub(crate) struct MotorGuard {
     pub(super) listens: bool,
     /// Whether targets are taken again after a recovery.
     resumes: bool,
-    refused_targets: u16,
-    forgotten_targets: u16,
+    pub(crate) refused_targets: u16,
+    pub(crate) forgotten_targets: u16,
     pub(crate) latch: Latch,
 }
 
@@ -65,7 +59,7 @@ impl MotorGuard {
     /// A motor with feedback: disarmed, unheard.
     pub(crate) const NEW: Self = Self {
         heard: 0,
-        in_time: 0,
+        in_time: InTime::NONE,
         commanded: 0,
         link: Link::Unheard,
         arming: Arming::Disarmed,
@@ -128,12 +122,20 @@ impl MotorGuard {
         self.is_armed() && self.link == Link::Online && self.has_target
     }
 
-    pub(crate) const fn refused_targets(&self) -> u16 {
-        self.refused_targets
+    /// Tells what an update does, once ages are compared and the health is checked; `held` is `None` in an update with a usable step.
+    #[inline]
+    pub(crate) fn turn(&self, held: Option<Hold>) -> Turn {
+        match held {
+            _ if !self.drives() => Turn::Rest,
+            None => Turn::Drive,
+            Some(Hold::Keep) if !self.has_rested() => Turn::Repeat,
+            Some(_) => Turn::Rest,
+        }
     }
 
-    pub(crate) const fn forgotten_targets(&self) -> u16 {
-        self.forgotten_targets
+    /// Tells whether the loops have not run since a rest.
+    pub(crate) fn has_rested(&self) -> bool {
+        self.rest != Rest::None
     }
 
     /// Tells whether the feedback is not fresh.
@@ -148,34 +150,19 @@ impl MotorGuard {
     /// Tells whether feedback now comes within the trusted gap, for a motor that is online.
     #[inline(always)]
     pub(crate) const fn is_in_time(&self, now: u32) -> bool {
-        self.trusts(now.wrapping_sub(self.heard))
-    }
-
-    /// Tells whether a time in µs is shorter than the trusted gap.
-    #[inline(always)]
-    pub(in crate::motor) const fn trusts(&self, micros: u32) -> bool {
-        micros < self.in_time >> COUNT_BITS
+        self.in_time.trusts(now.wrapping_sub(self.heard))
     }
 
     /// Notes feedback that is [in time](Self::is_in_time).
     #[inline(always)]
     pub(crate) const fn hear_in_time(&mut self, now: u32) {
         self.heard = now;
-        self.in_time = self.in_time.wrapping_add(1);
-    }
-
-    /// Returns the number of feedback frames in time since the last call.
-    pub(crate) const fn take_in_time(&mut self) -> u16 {
-        let [low, high, ..] = (self.in_time & COUNT).to_le_bytes();
-        self.in_time &= !COUNT;
-        u16::from_le_bytes([low, high])
+        self.in_time.count();
     }
 
     /// Sets the trusted gap; 0 unless the motor is online.
     pub(crate) const fn trust(&mut self, gap_us: u32) {
-        let most = if matches!(self.link, Link::Online) { u32::MAX >> COUNT_BITS } else { 0 };
-        let gap_us = if gap_us < most { gap_us } else { most };
-        self.in_time = gap_us << COUNT_BITS | self.in_time & COUNT;
+        self.in_time.trust(if matches!(self.link, Link::Online) { gap_us } else { 0 });
     }
 
     /// Notes feedback of an online motor, if the previous feedback and update are recent; otherwise does nothing and returns `false`.
@@ -227,9 +214,9 @@ impl MotorGuard {
 
     fn set_late(&mut self) {
         self.link = Link::Late;
-        self.in_time &= COUNT;
+        self.in_time.trust(0);
         self.latch.set(Condition::Late, true);
-        self.rest = self.rest.max(Rest::Pause);
+        self.pause();
     }
 
     /// Handles a lost motor: relaxes, and refuses targets until armed again or, if configured, until recovered.
@@ -296,7 +283,7 @@ impl MotorGuard {
             Arming::Armed => {
                 // A pause is enough, without a reset of the loops: a late motor is soon offline.
                 self.has_target = false;
-                self.rest = self.rest.max(Rest::Pause);
+                self.pause();
                 TargetError::NoFeedback
             }
         }
@@ -334,13 +321,18 @@ impl MotorGuard {
         self.rest = Rest::Relaxed;
     }
 
-    /// Ends the rest and returns its kind.
+    /// Notes a pause: older measurements give no rate, and the last command is not sent again.
+    pub(crate) fn pause(&mut self) {
+        self.rest = self.rest.max(Rest::Pause);
+    }
+
+    /// Ends the rest, as the loops run, and returns its kind.
     pub(crate) const fn end_rest(&mut self) -> Rest {
         core::mem::replace(&mut self.rest, Rest::None)
     }
 
     /// Takes targets from now on, beginning at rest.
-    pub(crate) const fn engage(&mut self, now: u32) {
+    pub(super) const fn engage(&mut self, now: u32) {
         self.relax();
         self.arming = Arming::Armed;
         self.open(now);
@@ -469,7 +461,7 @@ mod tests {
         }
         motor.trust(93_250);
         assert!(motor.is_in_time(4_000 + 93_249) && !motor.is_in_time(4_000 + 93_250));
-        assert_eq!([motor.take_in_time(), motor.take_in_time()], [3_000, 0]);
+        assert_eq!([motor.in_time.take(), motor.in_time.take()], [3_000, 0]);
         assert!(motor.is_in_time(4_000 + 93_249) && !motor.is_in_time(4_000 + 93_250));
         motor.trust(u32::MAX);
         assert!(motor.is_in_time(4_000 + 131_070) && !motor.is_in_time(4_000 + 131_071));

@@ -149,3 +149,22 @@ fn a_blocked_motor_stays_relaxed_however_often_it_is_armed() {
     }
     assert_eq!(stalls, 1);
 }
+
+/// A refused target takes the one before away, also where a good one comes in the same cycle.
+#[test]
+fn a_good_velocity_behind_a_refused_one_starts_the_loop_afresh() {
+    let log = Log::default();
+    let mut motor = integrator(&log);
+    let mut step = |ms: u64, refused: Option<f32>| {
+        motor.ingest_counts(0, at_ms(ms));
+        if let Some(rad_per_s) = refused {
+            motor.set_velocity((), AngularVelocity::from_rad_per_s(rad_per_s)).unwrap_err();
+        }
+        motor.set_velocity((), AngularVelocity::from_rad_per_s(10.0)).unwrap();
+        motor.update(tick(ms)).unwrap();
+        motor.duty()
+    };
+    let (first, last) = (step(1, None), (2..=200).map(|ms| step(ms, None)).last().unwrap());
+    let afresh = step(201, Some(f32::NAN));
+    assert!(last > 1.2 * first && (afresh - first).abs() < 1e-6, "{first}, {last}, {afresh}");
+}

@@ -1,8 +1,8 @@
 //! Feedback, update, conditions and state of one joint.
 
 use super::{ALL, JUMP, LAST, Slot, Standing};
-use crate::encoder::{Homing, Position};
-use crate::motor::{self, Condition, Health, Link, MotorName, Traffic};
+use crate::encoder::{self, Homing, Position};
+use crate::motor::{Condition, Health, Hold, Link, MotorName, Traffic, Turn};
 use crate::snake::model::PULSES_PER_TURN;
 use crate::snake::{Register, State};
 use crate::time::{Duration, Edge, Instant};
@@ -64,10 +64,8 @@ impl Slot {
 
     /// Handles a drive in an unexpected state: its zero may differ, so the joint stays relaxed until armed again.
     fn distrust(&mut self, now: Instant) {
-        self.guard.change(now, |motor| motor.judge(Condition::Fault, true, self.stall.health()));
+        self.guard.fail(now, self.stall.health());
         self.lose_zero(now);
-        // Of a joint that is not armed too: a request to arm counts once the jumps are over.
-        self.guard.trip();
     }
 
     fn lose_zero(&mut self, now: Instant) {
@@ -78,15 +76,22 @@ impl Slot {
     }
 
     /// Brings the joint to `now`. Returns whether the joint must be disabled.
-    pub(in crate::snake) fn update(&mut self, now: Instant) -> bool {
+    pub(in crate::snake) fn update(&mut self, now: Instant, held: Option<Hold>) -> bool {
+        if held == Some(Hold::LoseTime) {
+            // No age is known, of a joint that was attached since the last update neither.
+            self.guard.lose_time(now);
+            return self.let_go();
+        }
         let is_quiet = self.guard.is_quiet(now) && self.guard.link() == Link::Online;
-        let drives = self.guard.drives(now);
+        let held = self.guard.pass(now, held.is_none());
         let is_stalled = is_stalled(self, now);
         if is_stalled || !is_quiet {
             check(self, is_stalled, now);
         }
-        // The check may have relaxed the joint.
-        let drives = drives && self.guard.is_armed();
+        let drives = self.guard.turn(held) != Turn::Rest;
+        if drives {
+            self.guard.end_rest();
+        }
         let stops = self.driven && !drives;
         if drives && !self.driven {
             (self.pending, self.ahead) = (ALL, ALL);
@@ -132,7 +137,7 @@ fn way(one: i32, other: i32) -> f32 {
 /// Returns the largest way in rad of a joint from a position, so many s after the position was heard: to its target, if led since.
 fn furthest(slot: &Slot, before: i32, gap_s: f32) -> f32 {
     let target = if slot.was_led { slot.target } else { before };
-    JUMP + motor::furthest(gap_s, slot.rate, (way(before, target), way(0, slot.speed)))
+    JUMP + encoder::furthest(gap_s, slot.rate, (way(before, target), way(0, slot.speed)))
 }
 
 fn measure_rate(slot: &mut Slot, raw: i32, now: Instant) {

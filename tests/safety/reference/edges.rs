@@ -1,6 +1,6 @@
 //! The conditions of one motor, and a list of their changes that nobody has read.
 
-use super::{BadStep, Reference};
+use super::Reference;
 use drivetrain::motor::{Condition, Conditions, MotorName};
 use drivetrain::time::Edge;
 
@@ -140,8 +140,7 @@ impl Reference {
     /// Tells whether an edge of another condition may be: a motor of a bus that lost frames is not sure of its turns, once.
     pub(crate) fn is_news(&mut self, edge: &Edge<Condition, MotorName>) -> bool {
         let is_doubt = edge.condition == Condition::PositionUncertain && edge.began;
-        let is_bus = self.rules.bad_step == BadStep::Repeats;
-        is_doubt && is_bus && !core::mem::replace(&mut self.is_in_doubt, true)
+        is_doubt && self.rules.takes_turns && !core::mem::replace(&mut self.is_in_doubt, true)
     }
 
     pub(crate) fn has_unread(&self) -> bool {

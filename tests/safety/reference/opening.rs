@@ -1,6 +1,6 @@
 //! The share of the output that is open, in 64-bit times and 64-bit numbers.
 
-use super::{BadStep, Bounds, Reference};
+use super::{Bounds, Reference};
 use drivetrain::time::Duration;
 
 /// Effect of the open share on a target, which is itself a share of the full output.
@@ -76,11 +76,10 @@ impl Reference {
 
     pub(crate) fn predict(&mut self, now: u64) -> Bounds {
         let opens = self.rules.opens;
-        let is_bus = self.rules.bad_step == BadStep::Repeats;
         if core::mem::take(&mut self.has_rested) && self.rules.opens_again {
             self.opening.begin(now);
         }
-        if !is_bus {
+        if !self.rules.takes_turns {
             self.share = self.opening.share(now);
         }
         let share = self.share;

@@ -4,21 +4,6 @@ use super::{Opens, Rivals};
 use drivetrain::motor::Reaction;
 use drivetrain::time::Duration;
 
-/// What a time step that is zero or NaN does.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum BadStep {
-    /// The device leaves the last commands for one update that is not late, whatever the ages are.
-    Repeats,
-    /// The same, and the next one takes every target away; the motors do not see either update.
-    RepeatsThenRelaxes,
-    /// Ages count as ever; a motor that may be driven gets its last command once.
-    Ages,
-    /// The same, and the command is the target itself: there is no loop.
-    OpenLoop,
-    /// There is no time step.
-    Unknown,
-}
-
 /// What one motor differs in from the next.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Rules {
@@ -26,11 +11,14 @@ pub(crate) struct Rules {
     pub(crate) late_us: Option<u64>,
     /// It takes targets again after a recovery.
     pub(crate) resumes: bool,
-    pub(crate) bad_step: BadStep,
+    /// Its updates have a time step.
+    pub(crate) has_steps: bool,
+    /// Its device looks at one motor in each update.
+    pub(crate) takes_turns: bool,
+    /// Its device has a guard of its own for the time.
+    pub(crate) is_joint: bool,
     /// A request to arm is granted by the next update.
     pub(crate) arms_later: bool,
-    /// A request gives its time to targets, of a motor that is armed already as well.
-    pub(crate) arms_again: bool,
     /// Its drive is asked for settings and enabled first: until it is driven it may
     /// rest where the reference drives, and it may refuse to be armed.
     pub(crate) is_prepared: bool,

@@ -16,7 +16,7 @@ impl<const LISTENS: bool> Bare<LISTENS> {
 impl<const LISTENS: bool> Subject<1> for Bare<LISTENS> {
     const RULES: [Rules; 1] = [Rules {
         late_us: if LISTENS { Some(10_000) } else { None },
-        bad_step: BadStep::Unknown,
+        has_steps: false,
         opens: Opens::Fills,
         resolution: 1e-6,
         rivals: Rivals::Never,

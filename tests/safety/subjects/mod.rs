@@ -9,7 +9,7 @@ mod odrive;
 #[cfg(feature = "hal")]
 pub(super) mod pins;
 
-use super::reference::{BadStep, Opens, Refusal, Rivals, Rules, Setup};
+use super::reference::{Opens, Refusal, Rivals, Rules, Setup};
 pub(super) use bus::{Both, Wheel};
 pub(super) use drives::{Damiao, RobStride, Vesc};
 use drivetrain::frame::CanFrame;
@@ -67,9 +67,10 @@ pub(super) trait Subject<const N: usize> {
 const BUS: Rules = Rules {
     late_us: Some(10_000),
     resumes: false,
-    bad_step: BadStep::Repeats,
+    has_steps: true,
+    takes_turns: true,
+    is_joint: false,
     arms_later: false,
-    arms_again: true,
     is_prepared: false,
     room: 12,
     loses_zero: false,
@@ -78,7 +79,7 @@ const BUS: Rules = Rules {
     resolution: 1e-4,
     rivals: Rivals::Configured,
 };
-const OWN: Rules = Rules { bad_step: BadStep::Ages, arms_again: false, room: 6, ..BUS };
+const OWN: Rules = Rules { takes_turns: false, room: 6, ..BUS };
 const ACTUATOR: Rules = Rules { opens_again: true, ..OWN };
 /// A drive whose own loop follows the target, with the resolution of its frames.
 const PREPARED: Rules = Rules { is_prepared: true, resolution: 0.013, ..ACTUATOR };

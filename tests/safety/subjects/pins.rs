@@ -69,7 +69,6 @@ pub(crate) fn esc(setup: Setup) -> RcPwm<Pin> {
 impl Subject<1> for RcPwm<Pin> {
     const RULES: [Rules; 1] = [Rules {
         late_us: None,
-        bad_step: BadStep::OpenLoop,
         arms_later: true,
         resolution: 0.0015,
         rivals: Rivals::Never,
