@@ -105,6 +105,7 @@ pub(super) fn end_without_step<const N: usize>(
     }
 }
 
+#[inline(always)]
 fn pass<const N: usize>(
     motors: &mut Motors<N>,
     outbox: &mut Outbox,

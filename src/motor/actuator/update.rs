@@ -141,7 +141,7 @@ impl<M: DriveProtocol> Actuator<M> {
 
 impl<M: DriveProtocol> Actuator<M> {
     /// Moves on to a tick in which the rules have nothing to change; otherwise returns `false`, and moves nothing.
-    #[inline]
+    #[inline(always)]
     pub(super) fn goes_on(&mut self, step: TimeStep, now: Instant) -> bool {
         if !self.is_steady || step.is_hold() {
             return false;
