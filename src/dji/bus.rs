@@ -305,8 +305,8 @@ impl<B, const N: usize> Bus<B, N> {
     /// Runs every loop once and encodes the commands.
     ///
     /// If an update lies before the arming, or not after the previous update, it sends zeros and relaxes every motor until armed again. A
-    /// `dt_s` of zero, below zero, infinite or NaN changes nothing, and keeps the last commands for one update, except those of relaxed
-    /// motors. A second such update in a row, or a late one, sends zeros. Above 20 ms, integrals and derivatives rest for the step.
+    /// `dt_s` of zero, below zero, infinite or NaN runs no loop, and keeps the last commands for one update, except those of motors that are
+    /// late or relaxed. A second such update in a row, or a late one, sends zeros. Above 20 ms, integrals and derivatives rest for the step.
     ///
     /// Costs 505 instructions on a Cortex-M4F, with 8 speed loops (`docs/figures.md`).
     ///

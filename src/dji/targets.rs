@@ -243,7 +243,8 @@ impl<B, const N: usize> Bus<B, N> {
     /// Costs 74 instructions on a Cortex-M4F (`docs/figures.md`).
     ///
     /// # Errors
-    /// Fails unless the motor is armed, online and has a position loop, and for NaN and infinity.
+    /// Fails unless the motor is armed, online and has a position loop, for NaN and infinity, and as [`TargetError::NotHomed`] while a zero that
+    /// was set is [in doubt](crate::encoder::Homing::Uncertain).
     pub fn set_position(
         &mut self,
         motor: impl Into<AnyHandle<B>>,

@@ -251,7 +251,7 @@ pub enum TargetError {
     Relaxed,
     /// The motor was attached without the control loop for this kind of target.
     NoLoop,
-    /// The position of a geared output shaft is relative to power-on until zeroed.
+    /// The position of a geared output shaft is relative to power-on until zeroed, or its zero was lost.
     NotHomed,
     /// This motor does not offer this kind of target.
     Unsupported,

@@ -221,13 +221,13 @@ impl<M: DriveProtocol> Actuator<M> {
         if core::mem::take(&mut self.is_resting) {
             self.reopen();
         }
-        let (opened, share) = (self.guard.share(), self.guard.share_of(left));
+        self.share = self.guard.share_of(left);
+        let opened = self.guard.share();
         if opened < 1.0 || self.watch.soft_limits().is_some() {
-            self.share = share;
             self.narrow(opened, step);
             return;
         }
-        self.keep_on(share, self.has_nothing_due() && !self.joint.awaits_zero());
+        self.keep_on(self.share, self.has_nothing_due() && !self.joint.awaits_zero());
     }
 
     /// Lets so much of the output, until the slow quantities are due. Of a `settled` motor a condition alone unsettles the next update.
