@@ -1,12 +1,9 @@
-//! Rules of a motor that is a device by itself.
+//! Rules of a motor that is a device by itself, and feedback of the motors of any device.
 
 use super::age;
-use super::safety::{DeviceGuard, Hold, MotorGuard, OPENING, Rest, Turn};
+use super::safety::{DeviceGuard, Guarded, Hold, MotorGuard, OPENING, Rest, Turn};
 use crate::motor::{Condition, HealthConfig, Link, TargetError, Timeouts};
 use crate::time::{Duration, Instant};
-
-/// After a silence of so long a drive may have started again, in µs.
-pub(super) const SILENCE_US: u32 = 100_000;
 
 /// Decides whether one motor of your own may be driven, by the rules of all motors of this crate:
 ///
@@ -82,12 +79,10 @@ impl Guard {
     #[cold]
     #[inline(never)]
     fn hear_anytime(&mut self, now: Instant) {
-        self.device.disturb();
         if !self.device.is_running() {
             self.device.pass_unwatched(core::slice::from_mut(&mut self.motor), now);
         }
-        let timeouts = *self.device.timeouts();
-        self.change(now, |motor| motor.hear(now.stamp(), &timeouts));
+        self.device.hear(&mut self.motor, 0, now, |_| {});
     }
 
     /// Returns the time since the last feedback in µs; `None` before the first.
@@ -97,27 +92,9 @@ impl Guard {
         is_heard.then(|| age(now.stamp(), self.motor.heard()))
     }
 
-    /// Tells whether a drive may have started again without feedback for so long. Feedback that is late only after more is polled seldom.
-    pub(crate) fn is_silence(&self, gap_us: u32) -> bool {
-        let timeouts = self.device.timeouts();
-        gap_us > timeouts.late_us() && gap_us > timeouts.offline_us().min(SILENCE_US)
-    }
-
     /// Notes that the angle counts from an unknown zero, and [trips](Self::relax_until_armed).
     pub(crate) fn lose_zero(&mut self, now: Instant) {
-        self.change(now, |motor| {
-            motor.latch.set(Condition::PositionUncertain, true);
-            motor.trip();
-        });
-    }
-
-    /// Trips as by a fault of the drive. A request to arm counts when this was not called for 100 ms.
-    pub(crate) fn fail(&mut self, now: Instant, config: &HealthConfig) {
-        self.change(now, |motor| {
-            motor.judge(Condition::Fault, true, config);
-            motor.trip();
-        });
-        self.device.trip();
+        self.change(now, MotorGuard::lose_zero);
     }
 
     /// Notes a command of the motor by another node.
@@ -224,13 +201,6 @@ impl Guard {
     /// Closes the output range and opens it from now on: the drive did not follow before.
     pub(super) const fn reopen(&mut self) {
         self.motor.open(self.device.now());
-    }
-
-    /// Handles a time that did not move on, so that no age is known. Feedback counts as late until the next frame, and the motor trips.
-    pub(crate) fn lose_time(&mut self, now: Instant) {
-        let before = self.device.begin(now);
-        self.device.moves_on(before);
-        self.device.lose_time(core::slice::from_mut(&mut self.motor), before);
     }
 
     /// Trips: discards the target and refuses others until the motor is armed again.
@@ -350,6 +320,31 @@ impl Default for Guard {
     }
 }
 
+/// Feedback of the motors of a device.
+impl<const N: usize> DeviceGuard<N> {
+    /// Notes feedback of a motor after a gap of any length, once the motor has taken the `consequences` of the gap.
+    pub(crate) fn hear<M: Guarded>(
+        &mut self,
+        motor: &mut M,
+        index: u8,
+        now: Instant,
+        consequences: impl FnOnce(&mut M),
+    ) {
+        let timeouts = *self.timeouts();
+        self.disturb();
+        self.change(motor, index, now, |motor| {
+            consequences(motor);
+            motor.guard().hear(now.stamp(), &timeouts);
+        });
+    }
+
+    /// Trusts feedback of a motor after a shorter gap than this, once the device was updated.
+    pub(crate) fn trust(&self, motor: &mut MotorGuard, gap_us: u32) {
+        let gap_us = gap_us.min(self.timeouts().late_us());
+        motor.trust(if self.is_running() { gap_us } else { 0 });
+    }
+}
+
 /// Feedback and updates for which no rule is due.
 impl Guard {
     /// Notes feedback within the [trusted](Self::trust) gap; otherwise returns `false`, and notes nothing.
@@ -366,8 +361,7 @@ impl Guard {
 
     /// Trusts feedback after a shorter gap than this, once the motor was updated.
     pub(crate) fn trust(&mut self, gap_us: u32) {
-        let gap_us = gap_us.min(self.device.timeouts().late_us());
-        self.motor.trust(if self.device.is_running() { gap_us } else { 0 });
+        self.device.trust(&mut self.motor, gap_us);
     }
 
     /// Returns the number of frames [in time](Self::hear_in_time) since the last call.

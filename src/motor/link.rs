@@ -3,6 +3,9 @@
 use crate::error::ConfigError;
 use crate::time::{Duration, Instant};
 
+/// After a silence of so long a drive may have started again, in µs.
+pub(crate) const SILENCE_US: u32 = 100_000;
+
 /// Whether a motor is heard.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -157,6 +160,11 @@ impl Timeouts {
     #[must_use]
     pub const fn good_frames(&self) -> u8 {
         self.good_frames
+    }
+
+    /// Tells whether a drive may have started again without feedback for so long. Feedback that is late only after more is polled seldom.
+    pub(crate) fn is_silence(&self, gap_us: u32) -> bool {
+        gap_us > self.late_us && gap_us > self.offline_us.min(SILENCE_US)
     }
 
     pub(crate) const fn late_us(&self) -> u32 {

@@ -94,7 +94,7 @@ pub(crate) use health::{
 };
 pub use health::{Condition, Conditions, Health, HealthConfig, Reaction, Vitals};
 pub use homing::{HomingStep, StopHoming};
-pub(crate) use link::{InTime, age, is_near, take_age};
+pub(crate) use link::{InTime, SILENCE_US, age, is_near, take_age};
 pub use link::{Link, Timeouts};
 pub use load::BusLoad;
 pub use safety::OPENING;

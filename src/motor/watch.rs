@@ -122,7 +122,7 @@ impl Watch {
 
     /// Trips the motor as by a fault that the drive reports in one update.
     pub(crate) fn fail(&self, guard: &mut Guard, now: Instant) {
-        guard.fail(now, self.config);
+        guard.change(now, |motor| motor.fail(self.config));
     }
 
     /// Tells whether the motor must not be armed.
@@ -306,27 +306,7 @@ impl Guard {
 
     /// Returns the part of a motor's health that the guard holds.
     pub(crate) const fn health(&self, motor: MotorName) -> Health {
-        Health {
-            motor,
-            link: self.link(),
-            armed: self.is_armed(),
-            conditions: self.conditions(),
-            feedback_hz: 0,
-            longest_gap: Duration::ZERO,
-            temperature_c: None,
-            error_code: 0,
-            saturated: 0,
-            refused_targets: self.refused_targets(),
-            forgotten_targets: self.forgotten_targets(),
-            ambiguous_gaps: 0,
-        }
-    }
-
-    /// Returns the time of the edge that [`next_edge`](Self::next_edge) returns next: to read several motors in order.
-    pub(crate) fn next_edge_at(&self) -> Option<Instant> {
-        self.motor.latch.next()?;
-        let (journal, now) = (&self.device.journal, self.device.updated());
-        Some(journal.first_time(now).unwrap_or_else(|| journal.last_time(now)))
+        self.motor.health(motor)
     }
 }
 
@@ -337,6 +317,36 @@ impl MotorGuard {
         let before = self.latch.active();
         self.latch.set(condition, holds && !config.ignores(condition));
         self.react(before, 1.0, config);
+    }
+
+    /// Trips as by a fault of the drive, which is in a state that nobody told it.
+    pub(crate) fn fail(&mut self, config: &HealthConfig) {
+        self.judge(Condition::Fault, true, config);
+        self.trip();
+    }
+
+    /// Notes that the angle counts from an unknown zero, and trips.
+    pub(crate) const fn lose_zero(&mut self) {
+        self.latch.set(Condition::PositionUncertain, true);
+        self.trip();
+    }
+
+    /// Returns the part of a motor's health that the guard holds.
+    pub(crate) const fn health(&self, motor: MotorName) -> Health {
+        Health {
+            motor,
+            link: self.link(),
+            armed: self.is_armed(),
+            conditions: self.latch.active(),
+            feedback_hz: 0,
+            longest_gap: Duration::ZERO,
+            temperature_c: None,
+            error_code: 0,
+            saturated: 0,
+            refused_targets: self.refused_targets,
+            forgotten_targets: self.forgotten_targets,
+            ambiguous_gaps: 0,
+        }
     }
 
     /// Trips the motor if a condition that began since `before` demands rest, or the motor must not be armed. Discards the target if the

@@ -3,7 +3,7 @@ use super::schedule::{self, Answers, count};
 use super::slot::Slot;
 use super::{AttachError, Command, Config, Joint, Joints, Register, State};
 use crate::frame::CanFrame;
-use crate::motor::{BusLoad, DeviceGuard, Hold, Ingest, Link, MotorGuard, MotorName, Timeouts};
+use crate::motor::{BusLoad, Condition, DeviceGuard, Hold, Ingest, Link, MotorName, Timeouts};
 use crate::time::{Duration, Instant, Tick, TimeStep};
 use embedded_can::Frame;
 
@@ -41,7 +41,7 @@ impl Joints {
         .with_timeouts(Timeouts::POLLED)
     }
 
-    /// Sets the ages at which feedback and targets count as lost, for joints attached afterwards.
+    /// Sets the ages at which feedback and targets count as lost.
     #[must_use]
     pub const fn with_timeouts(mut self, timeouts: Timeouts) -> Self {
         self.guard.set_timeouts(timeouts);
@@ -111,7 +111,7 @@ impl Joints {
             return Err(AttachError::Taken(joint));
         }
         let generation = slot.next_generation().ok_or(AttachError::WornOut(joint))?;
-        *slot = Slot::new(&config, *self.guard.timeouts(), generation)?;
+        *slot = Slot::new(&config, generation)?;
         self.returned.0 |= 1 << index;
         Ok(Joint::new(index, generation))
     }
@@ -119,7 +119,9 @@ impl Joints {
     /// Detaches a joint and disables it once more.
     pub fn detach(&mut self, joint: Joint) {
         let Some(slot) = self.slot_mut(joint) else { return };
+        let place = slot.place();
         slot.free();
+        self.guard.journal.forget(place);
         schedule::stop(self, joint.index());
         schedule::drop_read(self, joint.index());
     }
@@ -129,8 +131,11 @@ impl Joints {
     /// Costs 220 instructions on a Cortex-M4F (`docs/figures.md`).
     pub fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
         let index = frame.header().wrapping_sub(1) as usize;
+        if index < SLOTS && !self.guard.is_running() {
+            self.guard.pass_unwatched(&mut self.slots, now);
+        }
         let Some(slot) = self.slots.get_mut(index) else { return Ingest::Unrelated };
-        let counters = &mut self.counters;
+        let (counters, rules) = (&mut self.counters, &mut self.guard);
         let reply = Register::from_reply(frame.data());
         if let Some((register, _)) = reply {
             self.answers.take(index, register);
@@ -142,7 +147,7 @@ impl Joints {
         match reply {
             Some(reply) => {
                 count(&mut counters.replies);
-                slot.receive(reply, now);
+                slot.receive(rules, reply, now);
                 self.let_go(index);
                 return Ingest::Taken;
             }
@@ -151,7 +156,11 @@ impl Joints {
                     return Ingest::Unrelated;
                 }
                 count(&mut counters.foreign_commands);
-                slot.guard.hear_rival(now, slot.stall.health());
+                rules.hear_rival(now.stamp());
+                rules.change(slot, slot.place(), now, |slot| {
+                    slot.guard.judge(Condition::SecondMaster, true, slot.stall.health());
+                });
+                rules.disturb();
             }
             None => count(match frame.length() {
                 6 => &mut counters.bad_field,
@@ -177,20 +186,24 @@ impl Joints {
         let has_step = !TimeStep::new(tick.dt_s(), ANY_STEP_S).is_hold();
         let is_quiet = has_step && self.guard.is_quiet(before, tick.now());
         if !is_quiet {
-            if let Some(hold) = self.guard.pass::<MotorGuard>(&mut [], before, has_step, u32::MAX) {
+            let held = self.guard.pass(&mut self.slots, before, has_step, u32::MAX);
+            if let Some(hold) = held {
                 return self.hold(hold);
             }
         }
         self.now = tick.now();
         self.give_up(Some(self.reply_timeout));
-        self.update_joints(self.now, None);
+        self.update_joints(is_quiet, None);
         schedule::plan(self);
     }
 
-    fn update_joints(&mut self, now: Instant, held: Option<Hold>) {
+    fn update_joints(&mut self, is_quiet: bool, held: Option<Hold>) {
         for index in 0..SLOTS {
-            let Some(slot) = self.slots.get_mut(index) else { continue };
-            if slot.id.is_some() && (slot.update(now, held) || slot.wants_reminder(self.now)) {
+            let Some(slot) = self.slots.get_mut(index).filter(|slot| slot.id.is_some()) else {
+                continue;
+            };
+            let stops = slot.update(&mut self.guard, is_quiet, held);
+            if stops || slot.wants_reminder(self.now) {
                 schedule::stop(self, index);
             }
         }
@@ -216,7 +229,7 @@ impl Joints {
         let held = Duration::from_millis(self.guard.held_steps().into());
         let is_long = held > self.reply_timeout;
         self.give_up((!(stands && is_long)).then_some(self.reply_timeout));
-        self.update_joints(now, Some(hold));
+        self.update_joints(false, Some(hold));
         schedule::stop_again(self);
     }
 

@@ -4,8 +4,7 @@ use super::slot::Slot;
 use super::{Joints, schedule};
 use crate::frame::CanFrame;
 use crate::motor::{
-    CanDevice, Claim, Condition, Conditions, Devices, Guard, Ingest, MotorName, Visitor,
-    WrongSetting,
+    CanDevice, Claim, Condition, Conditions, Devices, Ingest, MotorName, Visitor, WrongSetting,
 };
 use crate::time::{Edge, Instant, Tick};
 use embedded_can::StandardId;
@@ -45,7 +44,8 @@ impl CanDevice for Joints {
     }
 
     fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName> {
-        self.slots.iter().filter(move |slot| slot.is_missing(now)).filter_map(Slot::name)
+        let is_missing = move |slot: &&Slot| self.guard.misses(&slot.guard, now);
+        self.slots.iter().filter(is_missing).filter_map(Slot::name)
     }
 
     /// A fault of a joint ends when the joint is armed again.
@@ -58,10 +58,7 @@ impl CanDevice for Joints {
     }
 
     fn second_master(&self) -> Option<Claim> {
-        let slot = self
-            .slots
-            .iter()
-            .find(|slot| slot.guard.conditions().contains(Condition::SecondMaster))?;
+        let slot = self.slots.iter().find(|slot| slot.guard.latch.has(Condition::SecondMaster))?;
         let id = StandardId::new(u16::from(slot.id?))?;
         Some(Claim::command(id, slot.name()?))
     }
@@ -71,28 +68,23 @@ impl CanDevice for Joints {
     }
 
     fn ask(&mut self) -> bool {
-        let mut granted = true;
-        for slot in self.slots.iter_mut().filter(|slot| slot.id.is_some()) {
-            granted &= slot.guard.ask();
-        }
-        granted
+        self.guard.ask()
     }
 
     fn engage(&mut self, now: Instant) {
-        if !self.guard.is_stopped() {
-            let heard = self.slots.iter_mut().filter(|slot| slot.id.is_some());
-            for slot in heard.filter(|slot| !slot.is_missing(now)) {
-                slot.engage(now);
-            }
-        }
+        let is_chosen = |_, slot: &Slot| slot.id.is_some();
+        // Earlier behaviour of the drive no longer counts.
+        let begin = |slot: &mut Slot| slot.guard.latch.set(Condition::Fault, false);
+        self.guard.engage(&mut self.slots, now, is_chosen, begin);
     }
 
     fn disarm(&mut self) {
-        rest_all(self, Guard::disarm);
+        rest_all(self);
     }
 
     fn trip(&mut self) {
-        rest_all(self, Guard::trip);
+        rest_all(self);
+        self.guard.trip();
     }
 
     fn is_armed(&self) -> bool {
@@ -102,13 +94,12 @@ impl CanDevice for Joints {
 
     fn emergency_stop(&mut self) {
         if self.guard.set_stop(true) {
-            rest_all(self, Guard::emergency_stop);
+            rest_all(self);
             schedule::stop_all(self);
         }
     }
 
     fn clear_emergency_stop(&mut self) {
-        self.slots.iter_mut().for_each(|slot| slot.guard.clear_emergency_stop());
         self.guard.set_stop(false);
     }
 
@@ -136,14 +127,14 @@ impl Devices for Joints {
     }
 }
 
-/// Relaxes every joint.
-fn rest_all(joints: &mut Joints, rest: impl Fn(&mut Guard)) {
+/// Disarms every joint.
+fn rest_all(joints: &mut Joints) {
     for index in 0..joints.slots.len() {
         let Some(slot) = joints.slots.get_mut(index).filter(|slot| slot.id.is_some()) else {
             continue;
         };
         let was_armed = slot.guard.is_armed();
-        rest(&mut slot.guard);
+        slot.guard.disarm();
         _ = slot.let_go();
         // A program may disarm in each tick: a joint disabled already is only reminded.
         if was_armed || !slot.is_told() {

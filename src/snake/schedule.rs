@@ -2,10 +2,9 @@
 //! joint was detached.
 
 use super::model::{Budget, Counters, IDS, SLOTS};
-use super::slot::Slot;
+use super::slot::{Rules, Slot};
 use super::{Command, Register};
 use crate::frame::CanFrame;
-use crate::motor::DeviceGuard;
 use crate::time::{Duration, Instant};
 use embedded_can::Frame;
 
@@ -63,8 +62,7 @@ pub struct Joints {
     pub(super) told: u8,
     pub(super) written: u8,
     pub(super) asked: u8,
-    /// Rules of time and stop; each joint has a guard of its own.
-    pub(super) guard: DeviceGuard<0>,
+    pub(super) guard: Rules,
     /// Whether sent frames are received again.
     pub(super) echoes: bool,
     pub(super) counters: Counters,

@@ -6,7 +6,7 @@ use super::config::{Settings, Stall};
 use super::model::{FASTEST, PULSES_PER_TURN, name};
 use super::{AttachError, Command, Config, Register};
 use crate::encoder::Homing;
-use crate::motor::{Condition, Guard, Link, MotorName, TargetError, Timeouts, Traffic};
+use crate::motor::{Condition, DeviceGuard, Guarded, MotorGuard, MotorName, TargetError, Traffic};
 use crate::time::{Duration, Instant};
 use core::f32::consts::TAU;
 
@@ -54,10 +54,10 @@ pub(super) struct Slot {
     generation: u8,
     reversed: bool,
     settings: Settings,
-    pub(super) guard: Guard,
+    pub(super) guard: MotorGuard,
     pub(super) offset: Offset,
     homing: Homing,
-    raw: Option<i32>,
+    pub(super) raw: Option<i32>,
     raw_speed: i32,
     /// In rad/s, up to the marked position and its time.
     rate: f32,
@@ -94,13 +94,22 @@ struct Standing {
     since: Instant,
 }
 
+/// The common rules of the joints. So many unread edges have an order and a time of their own.
+pub(super) type Rules = DeviceGuard<24>;
+
+impl Guarded for Slot {
+    fn guard(&mut self) -> &mut MotorGuard {
+        &mut self.guard
+    }
+}
+
 impl Slot {
     pub(super) const FREE: Self = Self {
         id: None,
         generation: 0,
         reversed: false,
         settings: Settings::USUAL,
-        guard: Guard::new(),
+        guard: MotorGuard::FREE,
         offset: Offset(0),
         homing: Homing::Relative,
         raw: None,
@@ -129,11 +138,7 @@ impl Slot {
     };
 
     /// Makes the slot of a joint, validating its configuration.
-    pub(super) fn new(
-        config: &Config,
-        timeouts: Timeouts,
-        generation: u8,
-    ) -> Result<Self, AttachError> {
+    pub(super) fn new(config: &Config, generation: u8) -> Result<Self, AttachError> {
         let joint = name(config.id());
         let speed = config.speed.as_rad_per_s();
         let refused = if !(speed.is_finite() && speed >= 0.0 && to_pulses(speed) <= FASTEST) {
@@ -151,7 +156,7 @@ impl Slot {
             generation,
             reversed: config.reversed,
             settings: config.settings,
-            guard: Guard::new().with_timeouts(timeouts),
+            guard: MotorGuard::NEW,
             stall: config.stall,
             speed: to_pulses(speed),
             ..Self::FREE
@@ -175,15 +180,13 @@ impl Slot {
         self.id.is_some() && self.generation == joint.generation()
     }
 
-    pub(super) fn name(&self) -> Option<MotorName> {
-        self.id.map(name)
+    /// Returns the index of the slot.
+    pub(super) fn place(&self) -> u8 {
+        self.id.unwrap_or(1) - 1
     }
 
-    /// Takes targets from now on, if the joint is online. Earlier behaviour of the drive no longer counts.
-    pub(super) fn engage(&mut self, now: Instant) {
-        if self.guard.engage(now) {
-            self.guard.note(Condition::Fault, false, now);
-        }
+    pub(super) fn name(&self) -> Option<MotorName> {
+        self.id.map(name)
     }
 
     /// Tells whether a driven joint has a value to write, beside periodic refreshes.
@@ -231,11 +234,13 @@ impl Slot {
         self.turn = (self.turn + TURNS - 1) % TURNS;
     }
 
-    /// Tells whether a new target may be taken. A drive whose zero was lost may count from another angle, whole turns away.
+    /// Takes a new target. A drive whose zero was lost may count from another angle, whole turns away.
     #[inline]
-    pub(super) fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
+    pub(super) fn admit(&mut self, is_finite: bool, now: u32) -> Result<(), TargetError> {
         self.guard.admit(is_finite)?;
-        self.guard.require_zero((!self.homing.is_uncertain()).then_some(()))
+        self.guard.require_zero((!self.homing.is_uncertain()).then_some(()))?;
+        self.guard.take_target(now);
+        Ok(())
     }
 
     /// Sets a target in pulses from the joint's zero.
@@ -265,29 +270,14 @@ impl Slot {
         }
     }
 
-    /// Makes the present position zero.
-    ///
-    /// # Errors
-    /// [`TargetError::NoFeedback`] if the position is unknown.
-    pub(super) fn zero(&mut self, now: Instant) -> Result<(), TargetError> {
-        let raw = self.raw.filter(|_| self.guard.link() == Link::Online);
-        self.set_offset(Offset(raw.ok_or(TargetError::NoFeedback)?), now);
-        Ok(())
-    }
-
-    pub(super) fn set_offset(&mut self, offset: Offset, now: Instant) {
-        self.guard.note(Condition::PositionUncertain, false, now);
+    pub(super) const fn set_offset(&mut self, offset: Offset) {
+        self.guard.latch.set(Condition::PositionUncertain, false);
         self.offset = offset;
         self.homing = Homing::Homed;
     }
 
     const fn directed(&self, pulses: i32) -> i32 {
         if self.reversed { pulses.wrapping_neg() } else { pulses }
-    }
-
-    /// Tells whether there is no fresh position.
-    pub(super) fn is_missing(&self, now: Instant) -> bool {
-        self.id.is_some() && self.guard.is_missing(now)
     }
 }
 

@@ -4,7 +4,7 @@ use super::slot::{Offset, Slot, health, to_pulses};
 use super::{AttachError, Config, Joint, Joints, PULSES_PER_TURN, Register};
 use crate::encoder::Position;
 use crate::motor::{
-    Capabilities, Capability, Condition, Conditions, Health, MotorName, TargetError,
+    Capabilities, Capability, Condition, Conditions, Health, Link, MotorName, TargetError,
 };
 use crate::time::Edge;
 use crate::units::AngularVelocity;
@@ -82,10 +82,9 @@ impl Joints {
     /// # Errors
     /// The joint is detached, or not online: its position is then unknown.
     pub fn zero(&mut self, joint: Joint) -> Result<(), TargetError> {
-        let now = self.now;
-        self.slot_mut(joint).ok_or(TargetError::Detached)?.zero(now)?;
-        self.relax(joint);
-        Ok(())
+        let slot = self.slot(joint).ok_or(TargetError::Detached)?;
+        let raw = slot.raw.filter(|_| slot.guard.link() == Link::Online);
+        self.set_offset(joint, raw.ok_or(TargetError::NoFeedback)?)
     }
 
     /// Sets the position of a joint's zero in the counts of its drive, in pulses: for example a stored one. A joint with a target is
@@ -103,8 +102,9 @@ impl Joints {
     /// # Errors
     /// The joint is detached.
     pub fn set_offset(&mut self, joint: Joint, raw_pulses: i32) -> Result<(), TargetError> {
-        let now = self.now;
-        self.slot_mut(joint).ok_or(TargetError::Detached)?.set_offset(Offset(raw_pulses), now);
+        let slot = self.slots.get_mut(joint.index()).filter(|slot| slot.matches(joint));
+        let (slot, now) = (slot.ok_or(TargetError::Detached)?, self.guard.updated());
+        self.guard.change(slot, slot.place(), now, |slot| slot.set_offset(Offset(raw_pulses)));
         self.relax(joint);
         Ok(())
     }
@@ -177,13 +177,13 @@ impl Joints {
     /// Returns the conditions of a joint that hold; empty for a detached joint.
     #[must_use]
     pub fn conditions(&self, joint: Joint) -> Conditions {
-        self.slot(joint).map_or(Conditions::NONE, |slot| slot.guard.conditions())
+        self.slot(joint).map_or(Conditions::NONE, |slot| slot.guard.latch.active())
     }
 
     /// Returns the oldest unread edge of a joint.
     ///
-    /// No edge is lost, however late it is read. While an edge waits, the same change is not noted again. If more than 6 edges of a joint
-    /// wait, the later edges have the time of the sixth.
+    /// No edge is lost, however late it is read. While an edge waits, the same change is not noted again. If more than 24 edges wait, the later
+    /// edges have the time of the last of these.
     ///
     /// # Examples
     /// ```
@@ -206,8 +206,11 @@ impl Joints {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn next_edge(&mut self) -> Option<Edge<Condition, MotorName>> {
-        let waiting = self.slots.iter_mut().filter(|slot| health::next_edge_at(slot).is_some());
-        health::next_edge(waiting.min_by_key(|slot| health::next_edge_at(slot))?)
+        let now = self.guard.updated();
+        let edge = self.guard.journal.next_edge(&mut self.slots, now)?;
+        let Edge { source, condition, began, at } = edge;
+        let source = self.slots.get(usize::from(source))?.name()?;
+        Some(Edge { source, condition, began, at })
     }
 
     fn aim(
@@ -216,8 +219,13 @@ impl Joints {
         is_finite: bool,
         set: impl FnOnce(&mut Slot),
     ) -> Result<(), TargetError> {
+        let now = self.guard.now();
         let slot = self.slot_mut(joint).ok_or(TargetError::Detached)?;
-        let outcome = slot.admit(is_finite).map(|()| set(slot));
+        let had_target = slot.guard.has_target();
+        let outcome = slot.admit(is_finite, now).map(|()| set(slot));
+        if !had_target {
+            self.guard.disturb();
+        }
         // A refused target also cancels the present one.
         self.let_go(joint.index());
         outcome

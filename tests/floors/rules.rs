@@ -45,7 +45,6 @@ const AGES: Seeds<'static> = Seeds {
         "heard",
         "held_steps",
         "last_time",
-        "next_edge_at",
         "now",
         "pass_unwatched",
         "since",
@@ -184,7 +183,7 @@ const TRIPPING: [&str; 7] =
     ["trip", "relax_until_armed", "fail", "lose_zero", "lose_time", "judge", "react"];
 
 /// Calls by which a motor trips, by file: how many, and why.
-const TRIPS: [(&str, usize, &str); 9] = [
+const TRIPS: [(&str, usize, &str); 10] = [
     ("dji/device.rs", 1, "the runner trips all motors"),
     (
         "dji/slot/health.rs",
@@ -200,7 +199,8 @@ const TRIPS: [(&str, usize, &str); 9] = [
     ),
     ("snake/device.rs", 1, "the runner trips all joints"),
     ("snake/slot/health.rs", 4, "the joint lost its zero: in a silence, offline, by its drive"),
-    ("snake/slot/health.rs", 1, "time did not move on"),
+    ("snake/slot/health.rs", 1, "a drive in an unexpected state is not armed meanwhile"),
+    ("snake/bus.rs", 1, "a second master: as the configuration says"),
     (
         "snake/slot/health.rs",
         2,
@@ -218,8 +218,12 @@ const LINKS: [(&str, usize, &str); 10] = [
     ("motor/actuator/mod.rs", 1, "no values of old feedback"),
     ("motor/actuator/update.rs", 1, "a drive that was silent is asked for its settings again"),
     ("pwm/brushed.rs", 1, "no values of old counts"),
-    ("snake/slot.rs", 1, "a zero at the present position"),
-    ("snake/slot/health.rs", 5, "a position far from the last one; no stall of old feedback"),
+    ("snake/targets.rs", 1, "a zero at the present position"),
+    (
+        "snake/slot/health.rs",
+        6,
+        "a position after a silence, or far from the last one; no stall of old feedback",
+    ),
 ];
 
 /// Words of the rules, as a name begins with them.
@@ -292,7 +296,7 @@ const OWN_NAMES: [(&str, &str, &[&str]); 25] = [
     (
         "snake",
         "calls of the application, which the core answers",
-        &["is_joint_armed", "next_edge", "next_edge_at", "with_timeouts"],
+        &["is_joint_armed", "next_edge", "with_timeouts"],
     ),
     ("snake", "the core is asked for each joint", &["foreign_commands", "hold"]),
     ("snake", "the time of the last position", &["heard"]),

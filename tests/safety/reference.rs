@@ -86,8 +86,6 @@ pub(super) struct Reference {
     bounds: Bounds,
     is_in_doubt: bool,
     is_target_ahead: bool,
-    /// The motor saw the last update.
-    is_seen: bool,
 }
 
 impl Reference {
@@ -125,7 +123,6 @@ impl Reference {
             bounds: Bounds { least: 0.0, most: 0.0 },
             is_in_doubt: false,
             is_target_ahead: false,
-            is_seen: false,
         }
     }
 
@@ -143,20 +140,18 @@ impl Reference {
     pub(super) fn hear(&mut self, now: u64, link: Link) {
         let Some(late_us) = self.rules.late_us else { return };
         self.edges.begin_call();
-        let is_silence = now.saturating_sub(self.heard) > OFFLINE_US.max(late_us);
-        if self.rules.loses_zero
-            && is_silence
-            && !matches!(self.link, Link::Unheard | Link::Offline)
-        {
-            self.edges.set(Condition::PositionUncertain, true, now);
-            self.fall_to(Arming::Tripped);
-        }
+        let gap = now.saturating_sub(self.heard);
+        let is_silence = self.link != Link::Unheard && gap > OFFLINE_US.max(late_us);
         if !self.is_running {
             self.forget_after_a_pause(self.updated, now);
             self.updated = now;
             if self.link != Link::Unheard && self.is_far_ahead(now) && link == Link::Recovering {
                 self.lose(now);
             }
+        }
+        if self.rules.loses_zero && (is_silence || self.link == Link::Offline) {
+            self.edges.set(Condition::PositionUncertain, true, now);
+            self.fall_to(Arming::Tripped);
         }
         let was_offline = matches!(self.link, Link::Offline | Link::Recovering);
         let is_near =
@@ -189,20 +184,17 @@ impl Reference {
         is_far || listens && (self.link != Link::Online || !self.is_fresh(now))
     }
 
-    /// A stamp that lies far ahead may be taken for one long ago: a motor may be offline then. The pause that made one old is
-    /// lost where a joint saw only the update after it, whose time did not move on: its link may stay what it was.
-    /// A target that was set far ahead may be taken for an expired one, where the motor trips anyway.
+    /// A stamp that lies far ahead may be taken for one long ago: a motor may be offline then. A target that was set far ahead may be taken for an expired one, where the motor trips anyway.
     pub(super) fn accept(&mut self, link: Link, conditions: Conditions) {
         let is_lost = |link| matches!(link, Link::Late | Link::Recovering | Link::Offline);
         let now = self.device_updated.unwrap_or(0);
         let is_ahead = self.is_far_ahead(now) && link == Link::Offline;
-        let is_old = now > self.heard.saturating_add(TOLD_US) && self.rules.is_joint;
-        if is_lost(link) && is_lost(self.link) && (is_ahead || is_old) {
+        if is_lost(link) && is_lost(self.link) && is_ahead {
             self.link = link;
             let is_lost = link != Link::Late;
             self.edges.correct(Condition::Offline, is_lost, now);
         }
-        if self.rules.loses_zero && self.is_seen && self.link == Link::Offline {
+        if self.rules.loses_zero && self.device_updated.is_some() && self.link == Link::Offline {
             self.edges.set(Condition::PositionUncertain, true, now);
         }
         if self.is_target_ahead && conditions.contains(Condition::CommandLost) {
@@ -248,8 +240,7 @@ impl Reference {
     pub(super) fn update(&mut self, now: u64, has_step: bool) -> Option<Bounds> {
         self.edges.begin_call();
         let has_step = has_step || !self.rules.has_steps;
-        let device_before = self.device_updated.replace(now);
-        let device_moves_on = device_before.is_none_or(|before| before < now);
+        self.device_updated = Some(now);
         let before = core::mem::replace(&mut self.updated, now);
         let was_running = core::mem::replace(&mut self.is_running, true);
         self.is_target_ahead = self.target.is_some_and(|set| set > now.saturating_add(TOLD_US));
@@ -257,7 +248,7 @@ impl Reference {
         self.target_time = now;
         let step = if was_running { now.saturating_sub(before) } else { 0 };
         self.quiet_us = if moves_on { self.quiet_us + step.min(LONGEST_STEP_US) } else { 0 };
-        let loses_time = !moves_on || self.rules.is_joint && !device_moves_on;
+        let loses_time = !moves_on;
         // Before its first update, a motor without feedback has no other time.
         let since = before.max(self.armed_at);
         let is_pause = now.saturating_sub(since) > LONGEST_PAUSE_US;
@@ -275,7 +266,6 @@ impl Reference {
         } else if is_usable {
             self.end_what_is_over(now);
         }
-        self.is_seen = device_moves_on;
         if core::mem::take(&mut self.arms_with_update) {
             if !self.tripped || self.is_granted {
                 self.engage(now);

@@ -305,18 +305,13 @@ pub(in crate::dji) fn report(slot: &Slot) -> Option<Health> {
     let heard = slot.guard.link() != Link::Unheard;
     let celsius = celsius(slot.feedback.temperature());
     Some(Health {
-        motor: slot.name()?,
-        link: slot.guard.link(),
-        armed: slot.guard.is_armed(),
-        conditions: slot.guard.latch.active(),
         feedback_hz: slot.traffic.rate_hz(),
         longest_gap: Duration::from_micros(slot.traffic.longest_gap_us().into()),
         temperature_c: (heard && facts.has_temperature).then_some(celsius),
         error_code: slot.error_code,
         saturated: slot.saturated,
-        refused_targets: slot.guard.refused_targets,
-        forgotten_targets: slot.guard.forgotten_targets,
         ambiguous_gaps: slot.ambiguous_gaps,
+        ..slot.guard.health(slot.name()?)
     })
 }
 

@@ -4,8 +4,9 @@ use super::joint::{Inside, Start};
 use super::power::Reading;
 use super::{Actuator, DriveProtocol, INQUIRY, Impedance, Target};
 use crate::frame::CanFrame;
-use crate::motor::guard::SILENCE_US;
-use crate::motor::{Capability, Claim, Ingest, Link, Rest, Route, TargetError, Turn, Vitals};
+use crate::motor::{
+    Capability, Claim, Ingest, Link, Rest, Route, SILENCE_US, TargetError, Turn, Vitals,
+};
 use crate::time::{Instant, TimeStep};
 use embedded_can::Frame;
 
@@ -41,7 +42,7 @@ impl<M: DriveProtocol> Actuator<M> {
             self.watch.fail(&mut self.guard, now);
         }
         let gap_us = gap_us.unwrap_or(0);
-        let is_silence = self.guard.is_silence(gap_us);
+        let is_silence = self.guard.device.timeouts().is_silence(gap_us);
         if has_reset || is_silence {
             self.motor.forget_settings();
             self.watch.forget_drive();

@@ -188,12 +188,6 @@ impl<const N: usize> Journal<N> {
         Some(Entry { motor, condition, began: rest & 1 != 0, at })
     }
 
-    /// Returns the time of the oldest entry.
-    pub(crate) fn first_time(&self, now: Instant) -> Option<Instant> {
-        let at = self.at.get(usize::from(self.first)).filter(|_| self.length > 0)?;
-        Some(fine(*at, now))
-    }
-
     /// Forgets the entries of a detached motor.
     pub(crate) fn forget(&mut self, motor: u8) {
         for what in &mut self.what {

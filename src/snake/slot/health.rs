@@ -1,11 +1,11 @@
 //! Feedback, update, conditions and state of one joint.
 
-use super::{ALL, JUMP, LAST, Slot, Standing};
+use super::{ALL, JUMP, LAST, Rules, Slot, Standing};
 use crate::encoder::{self, Homing, Position};
-use crate::motor::{Condition, Health, Hold, Link, MotorName, Traffic, Turn};
+use crate::motor::{Condition, Health, Hold, Link, Traffic, Turn};
 use crate::snake::model::PULSES_PER_TURN;
 use crate::snake::{Register, State};
-use crate::time::{Duration, Edge, Instant};
+use crate::time::{Duration, Instant};
 use crate::units::{Angle, AngularVelocity};
 use core::f32::consts::TAU;
 
@@ -21,13 +21,18 @@ const THERE: u32 = PULSES_PER_TURN.unsigned_abs() / 64;
 impl Slot {
     /// Takes a reply received at `now`. Every reply is kept, but only a position is a sign of life: only the position changes without the
     /// attention of the controller.
-    pub(in crate::snake) fn receive(&mut self, (register, value): (Register, i32), now: Instant) {
+    pub(in crate::snake) fn receive(
+        &mut self,
+        rules: &mut Rules,
+        (register, value): (Register, i32),
+        now: Instant,
+    ) {
         match register {
-            Register::ActualPosition => self.receive_position(value, now),
+            Register::ActualPosition => self.receive_position(rules, value, now),
             Register::ActualSpeed => self.raw_speed = value,
             Register::Enable if is_up(self) && value == 0 => {
                 self.resets = self.resets.saturating_add(1);
-                self.distrust(now);
+                self.distrust(rules, now);
             }
             _ => {}
         }
@@ -36,57 +41,68 @@ impl Slot {
         }
     }
 
-    fn receive_position(&mut self, raw: i32, now: Instant) {
+    fn receive_position(&mut self, rules: &mut Rules, raw: i32, now: Instant) {
         let gap_us = now.since(self.heard).micros_u32().unwrap_or(u32::MAX);
-        let was_heard = !matches!(self.guard.link(), Link::Unheard | Link::Offline);
+        let link = self.guard.link();
+        let was_heard = !matches!(link, Link::Unheard | Link::Offline);
+        let is_silence = was_heard && rules.timeouts().is_silence(gap_us);
         let is_further = |before| way(before, raw) > furthest(self, before, gap_us as f32 * 1e-6);
         if was_heard && self.raw.is_some_and(is_further) {
             self.position_jumps = self.position_jumps.saturating_add(1);
-            self.distrust(now);
+            self.distrust(rules, now);
         }
         self.was_led = is_up(self);
         measure_rate(self, raw, now);
-        if !self.guard.hear_in_time(now) {
-            if was_heard && self.guard.is_silence(gap_us) {
-                self.lose_zero(now);
-            }
+        if self.guard.is_in_time(now.stamp()) {
+            self.guard.hear_in_time(now.stamp());
+        } else {
             match self.raw {
                 Some(_) => self.traffic.gap(gap_us),
                 None => self.window_from = now,
             }
             self.traffic.count();
-            self.guard.hear(now);
-            self.guard.trust(self.traffic.usual_gap_us());
+            rules.hear(self, self.place(), now, |slot| {
+                if is_silence || link == Link::Offline {
+                    slot.lose_zero();
+                }
+            });
+            rules.trust(&mut self.guard, self.traffic.usual_gap_us());
         }
         self.raw = Some(raw);
         self.heard = now;
     }
 
     /// Handles a drive in an unexpected state: its zero may differ, so the joint stays relaxed until armed again.
-    fn distrust(&mut self, now: Instant) {
-        self.guard.fail(now, self.stall.health());
-        self.lose_zero(now);
+    fn distrust(&mut self, rules: &mut Rules, now: Instant) {
+        rules.change(self, self.place(), now, |slot| {
+            slot.guard.fail(slot.stall.health());
+            slot.lose_zero();
+        });
+        // Of a joint that is not armed too: a request to arm counts once the jumps are over.
+        rules.trip();
     }
 
-    fn lose_zero(&mut self, now: Instant) {
-        self.guard.lose_zero(now);
+    fn lose_zero(&mut self) {
+        self.guard.lose_zero();
         if self.homing == Homing::Homed {
             self.homing = Homing::Uncertain;
         }
     }
 
-    /// Brings the joint to `now`. Returns whether the joint must be disabled.
-    pub(in crate::snake) fn update(&mut self, now: Instant, held: Option<Hold>) -> bool {
-        if held == Some(Hold::LoseTime) {
-            // No age is known, of a joint that was attached since the last update neither.
-            self.guard.lose_time(now);
-            return self.let_go();
-        }
-        let is_quiet = self.guard.is_quiet(now) && self.guard.link() == Link::Online;
-        let held = self.guard.pass(now, held.is_none());
+    /// Brings the joint to the time of the update. Returns whether the joint must be disabled.
+    pub(in crate::snake) fn update(
+        &mut self,
+        rules: &mut Rules,
+        is_quiet: bool,
+        held: Option<Hold>,
+    ) -> bool {
+        let now = rules.updated();
         let is_stalled = is_stalled(self, now);
-        if is_stalled || !is_quiet {
-            check(self, is_stalled, now);
+        if is_stalled || !is_quiet || self.guard.link() != Link::Online {
+            let is_alone = held.is_none().then_some(rules.is_alone());
+            rules.change(self, self.place(), now, |slot| check(slot, is_stalled, is_alone, now));
+            let waits = is_stalled || self.guard.latch.has(Condition::SecondMaster);
+            rules.wake_at(if waits { now } else { self.window_from + Traffic::WINDOW });
         }
         let drives = self.guard.turn(held) != Turn::Rest;
         if drives {
@@ -123,8 +139,8 @@ impl Slot {
             bad_replies: self.bad_replies,
             position_jumps: self.position_jumps,
             resets: self.resets,
-            refused_targets: self.guard.refused_targets(),
-            forgotten_targets: self.guard.forgotten_targets(),
+            refused_targets: self.guard.refused_targets,
+            forgotten_targets: self.guard.forgotten_targets,
         })
     }
 }
@@ -150,22 +166,22 @@ fn measure_rate(slot: &mut Slot, raw: i32, now: Instant) {
     }
 }
 
-/// Begins and ends conditions, and ends the window in which positions are counted. The next check is due at the end of the window, and
-/// during a condition with the next update.
-fn check(slot: &mut Slot, is_stalled: bool, now: Instant) {
-    if slot.guard.link() == Link::Offline {
-        slot.lose_zero(now);
+/// Begins and ends conditions, and ends the window in which positions are counted.
+fn check(slot: &mut Slot, is_stalled: bool, is_alone: Option<bool>, now: Instant) {
+    if let Some(is_alone) = is_alone {
+        slot.guard.end_what_is_over(is_alone);
     }
-    slot.guard
-        .change(now, |motor| motor.judge(Condition::Stalled, is_stalled, slot.stall.health()));
+    if slot.guard.link() == Link::Offline {
+        slot.lose_zero();
+    }
+    slot.guard.judge(Condition::Stalled, is_stalled, slot.stall.health());
     if slot.driven && slot.is_forgotten(now) {
         slot.renew(Register::Position);
     }
-    slot.traffic.add(slot.guard.take_in_time());
+    slot.traffic.add(slot.guard.in_time.take());
     if slot.traffic.end_window(&mut slot.window_from, now) {
         slot.guard.trust(0);
     }
-    slot.guard.wake_at(if is_stalled { now } else { slot.window_from + Traffic::WINDOW });
 }
 
 /// Tells whether a joint away from its target stands for too long: the joint is blocked, or its drive does not follow.
@@ -192,15 +208,6 @@ fn is_fast_enough(slot: &Slot) -> bool {
     let time_s = slot.stall.window.as_secs_f32();
     let sped_up = 0.5 * slot.settings.acceleration as f32 * time_s * time_s;
     sped_up.min(slot.speed as f32 * time_s) > 4.0 * STANDS as f32
-}
-
-/// Returns the time of the edge that is read next.
-pub(in crate::snake) fn next_edge_at(slot: &Slot) -> Option<Instant> {
-    slot.id.and_then(|_| slot.guard.next_edge_at())
-}
-
-pub(in crate::snake) fn next_edge(slot: &mut Slot) -> Option<Edge<Condition, MotorName>> {
-    slot.guard.next_edge(slot.name()?)
 }
 
 /// Returns the health of the joint.

@@ -15,8 +15,6 @@ pub(crate) struct Rules {
     pub(crate) has_steps: bool,
     /// Its device looks at one motor in each update.
     pub(crate) takes_turns: bool,
-    /// Its device has a guard of its own for the time.
-    pub(crate) is_joint: bool,
     /// A request to arm is granted by the next update.
     pub(crate) arms_later: bool,
     /// Its drive is asked for settings and enabled first: until it is driven it may

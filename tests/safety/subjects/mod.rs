@@ -69,7 +69,6 @@ const BUS: Rules = Rules {
     resumes: false,
     has_steps: true,
     takes_turns: true,
-    is_joint: false,
     arms_later: false,
     is_prepared: false,
     room: 12,
