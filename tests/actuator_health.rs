@@ -19,6 +19,7 @@ use std::rc::Rc;
 struct Talker {
     vitals: Vitals,
     share: f32,
+    is_frozen: bool,
     /// Reported instead of what the frame said.
     instead: Rc<Cell<Option<Vitals>>>,
 }
@@ -57,7 +58,7 @@ impl DriveProtocol for Talker {
         CanFrame::of(id(0x123), [0; 8])
     }
     fn control(&mut self, order: Order) -> CanFrame {
-        self.share = order.share;
+        (self.share, self.is_frozen) = (order.share, order.step.is_frozen());
         CanFrame::of(id(0x123), [100; 8])
     }
     fn reset(&mut self) {}
@@ -339,4 +340,16 @@ proptest! {
             prop_assert!((0.0..=1.0).contains(&share), "{} of {:?}", share, vitals);
         }
     }
+}
+
+/// A loop that takes the rate of a measurement from before late feedback would kick.
+#[test]
+fn the_first_step_after_late_feedback_is_frozen() {
+    let mut bench = Bench::new(&USUAL);
+    let is_frozen = |bench: &Bench| bench.own.motor().is_frozen;
+    assert!((0..20).all(|_| bench.step([30, 0, 0, 0]) && !is_frozen(&bench)));
+    bench.ms += 14;
+    bench.own.update(Tick::new(bench.now(), 0.014));
+    assert!(bench.step([30, 0, 0, 0]) && is_frozen(&bench));
+    assert!(bench.step([30, 0, 0, 0]) && !is_frozen(&bench));
 }

@@ -130,6 +130,22 @@ fn a_drive_that_counts_anew_moves_no_joint_and_no_target() {
     }
 }
 
+/// An age of 32 bits repeats after 71 minutes, and counts as none from half of that on.
+#[test]
+fn a_drive_that_was_silent_for_an_hour_has_lost_its_zero() {
+    for minutes in [1, 20, 36, 50, 71, 72, 110] {
+        let mut bench = Bench::new(false, 1.5);
+        let end = minutes * 60_000;
+        for ms in (30_000..end).step_by(30_000) {
+            assert_eq!(bench.update(ms, 0.001), None);
+        }
+        for ms in end..end + 12 {
+            bench.hear(ms, 1.5, 0.0);
+        }
+        assert_eq!(bench.angle(), None, "{minutes} minutes");
+    }
+}
+
 /// A slipped encoder, a zero set by a tool, another drive with the same id: the joint is not where its angle says.
 #[test]
 fn an_angle_that_jumps_by_no_whole_turn_takes_the_zero_of_a_drive_that_knows_its_angle() {

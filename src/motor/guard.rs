@@ -92,6 +92,11 @@ impl Guard {
         is_heard.then(|| age(now.stamp(), self.motor.heard()))
     }
 
+    /// Tells whether a drive may have started again in this gap before feedback.
+    pub(crate) fn is_silence(&self, gap_us: u32) -> bool {
+        self.motor.is_silence(gap_us, self.device.timeouts())
+    }
+
     /// Notes that the angle counts from an unknown zero, and [trips](Self::relax_until_armed).
     pub(crate) fn lose_zero(&mut self, now: Instant) {
         self.change(now, MotorGuard::lose_zero);
@@ -193,9 +198,9 @@ impl Guard {
         self.motor.share(self.device.now())
     }
 
-    /// Returns the open share of the output range, at most the share that the conditions leave.
-    pub(crate) fn share_of(&mut self, left: f32) -> f32 {
-        self.motor.range(left, (false, false), self.device.now()).1
+    /// Returns the ends of the available output, as shares of the full output from -1 to 1, of which the conditions leave so much.
+    pub(crate) fn range(&mut self, left: f32) -> (f32, f32) {
+        self.motor.range(left, (false, false), self.device.now())
     }
 
     /// Closes the output range and opens it from now on: the drive did not follow before.

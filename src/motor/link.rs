@@ -162,11 +162,6 @@ impl Timeouts {
         self.good_frames
     }
 
-    /// Tells whether a drive may have started again without feedback for so long. Feedback that is late only after more is polled seldom.
-    pub(crate) fn is_silence(&self, gap_us: u32) -> bool {
-        gap_us > self.late_us && gap_us > self.offline_us.min(SILENCE_US)
-    }
-
     pub(crate) const fn late_us(&self) -> u32 {
         self.late_us
     }

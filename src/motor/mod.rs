@@ -54,7 +54,8 @@
 //!
 //! A latched and a tripped motor differ in one thing: if [`with_resume`](crate::dji::Config::with_resume) is configured, a latched motor
 //! takes targets again by itself when online. Each latch, each trip, and the emergency stop when set and when cleared, begin the pause of the gesture: a
-//! request to arm is granted after 100 ms without a request. Disarming begins no pause.
+//! request to arm is granted after 100 ms without a request. Disarming begins no pause. A geared motor of `dji` that lost its zero does not trip: it
+//! refuses positions.
 
 mod actuator;
 mod arming;

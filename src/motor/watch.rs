@@ -2,7 +2,7 @@
 
 use super::{
     Answers, Condition, Conditions, Guard, Health, HealthConfig, Latch, Link, Monitor, MotorGuard,
-    MotorName, Reaction, Traffic, Vitals,
+    MotorName, Reaction, SILENCE_US, Timeouts, Traffic, Vitals,
 };
 use crate::time::{Duration, Edge, Instant};
 
@@ -323,6 +323,13 @@ impl MotorGuard {
     pub(crate) fn fail(&mut self, config: &HealthConfig) {
         self.judge(Condition::Fault, true, config);
         self.trip();
+    }
+
+    /// Tells whether a drive may have started again in this gap before feedback: in a long one, or while the motor was offline. Feedback that is
+    /// late only after more is polled seldom.
+    pub(crate) fn is_silence(&self, gap_us: u32, timeouts: &Timeouts) -> bool {
+        let is_long = gap_us > timeouts.late_us() && gap_us > timeouts.offline_us().min(SILENCE_US);
+        self.link() == Link::Offline || self.link() != Link::Unheard && is_long
     }
 
     /// Notes that the angle counts from an unknown zero, and trips.

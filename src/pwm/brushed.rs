@@ -4,6 +4,7 @@ use super::Direction;
 use super::rc::duty;
 use crate::control::Pid;
 use crate::error::ConfigError;
+use crate::math::limited;
 use crate::motor::{
     ArmError, Capabilities, Capability, Condition, Conditions, Guard, Health, Link, MotorName,
     Obstacles, OneOf, Rest, TargetError, Turn, VelocityDrive, Vitals, Watch,
@@ -191,11 +192,12 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
             Turn::Repeat => self.output,
             Turn::Rest => 0.0,
         };
-        let limit = self.config.limit * self.guard.share_of(left);
-        self.output = asked.max(-limit).min(limit);
-        if limit < self.config.limit {
+        let (lower, upper) = self.guard.range(left);
+        let (lower, upper) = (lower * self.config.limit, upper * self.config.limit);
+        self.output = limited(asked, lower, upper);
+        if upper < self.config.limit {
             // The loop knows only the full limit, and would wind up.
-            self.speed.iter_mut().for_each(|speed| speed.keep_integral_between(-limit, limit));
+            self.speed.iter_mut().for_each(|speed| speed.keep_integral_between(lower, upper));
         }
         let output = if self.config.reversed { -self.output } else { self.output };
         let share = output.abs();

@@ -1,4 +1,5 @@
 use crate::error::ConfigError;
+use crate::math::limited;
 use crate::motor::{
     ArmError, Capabilities, Capability, Condition, Conditions, Guard, Health, Hold, MotorName,
     OPENING, Obstacles, TargetError, Timeouts, Turn, VelocityDrive,
@@ -253,10 +254,10 @@ impl<P: SetDutyCycle> RcPwm<P> {
     }
 
     fn pulse_of_target(&mut self) -> f32 {
-        let open = self.guard.share();
+        let (lower, upper) = self.guard.range(1.0);
         let [low, neutral, high] = self.pulses_us.map(f32::from);
         let reach = if self.throttle < 0.0 { neutral - low } else { high - neutral };
-        neutral + self.throttle.max(-open).min(open) * reach
+        neutral + limited(self.throttle, lower, upper) * reach
     }
 
     fn send(&mut self, pulse_us: f32) -> Result<(), P::Error> {

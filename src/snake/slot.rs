@@ -206,8 +206,8 @@ impl Slot {
 
     /// Relaxes a driven joint that may no longer be driven. Returns whether the joint must be disabled: not if there was no write since the
     /// last disable.
-    pub(super) const fn let_go(&mut self) -> bool {
-        let stops = self.driven && !(self.guard.is_armed() && self.guard.has_target());
+    pub(super) fn let_go(&mut self) -> bool {
+        let stops = self.driven && !self.guard.drives();
         self.driven = self.driven && !stops;
         stops && !self.is_told()
     }

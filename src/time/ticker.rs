@@ -212,6 +212,11 @@ impl TimeStep {
         Self::new(dt_s, Self::MOTOR_MAX_S)
     }
 
+    /// The same step, [frozen](Self::is_frozen): the measurement before is too old for a rate.
+    pub(crate) const fn frozen(self) -> Self {
+        Self { half_dt_s: f32::INFINITY, per_dt: f32::INFINITY, ..self }
+    }
+
     /// As [`new`](Self::new); `None` for a step that [holds](Self::is_hold).
     #[inline]
     pub(crate) const fn usable(dt_s: f32, dt_max_s: f32) -> Option<Self> {

@@ -219,11 +219,7 @@ const LINKS: [(&str, usize, &str); 10] = [
     ("motor/actuator/update.rs", 1, "a drive that was silent is asked for its settings again"),
     ("pwm/brushed.rs", 1, "no values of old counts"),
     ("snake/targets.rs", 1, "a zero at the present position"),
-    (
-        "snake/slot/health.rs",
-        6,
-        "a position after a silence, or far from the last one; no stall of old feedback",
-    ),
+    ("snake/slot/health.rs", 5, "a position far from the last one; no stall of old feedback"),
 ];
 
 /// Words of the rules, as a name begins with them.

@@ -85,7 +85,7 @@ impl CheckRound {
 pub(super) fn waive_check(slot: &mut Slot, facts: &Facts) {
     let is_well = slot.guard.latch.active().is_empty()
         && slot.guard.link() == Link::Online
-        && !slot.guard.is_opening()
+        && !slot.guard.is_opening
         && slot.error_code == 0
         && slot.range == Range::within(slot.full_limit)
         && slot.health.soft_limits.is_none();

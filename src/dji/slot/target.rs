@@ -134,12 +134,7 @@ impl Slot {
     ) -> Result<(), TargetError> {
         needs(self.has_position_loop())?;
         self.admit(way.is_finite() && rad_per_s.is_finite())?;
-        let Some(stamp) = stamp else {
-            if self.guard.has_target() {
-                self.guard.forget_target();
-            }
-            return Err(self.refuse(TargetError::StaleMeasurement));
-        };
+        let stamp = self.guard.require_fresh(stamp).map_err(|error| self.refuse(error))?;
         self.start(Action::Measured, Goal::measured(way, rad_per_s), stamp);
         Ok(())
     }
@@ -164,7 +159,7 @@ impl Slot {
         if !self.guard.has_target() {
             self.asked = Action::Rest;
         }
-        if !self.guard.latch.active().is_empty() || self.guard.is_opening() {
+        if !self.guard.latch.active().is_empty() || self.guard.is_opening {
             self.require_check();
         }
         let is_free = self.range == Range::within(self.full_limit)
@@ -224,7 +219,7 @@ impl Slot {
 
     /// Returns the share of its velocity available to a position loop: the open share of the output range.
     fn opened_part(&self) -> f32 {
-        if !self.guard.is_opening() {
+        if !self.guard.is_opening {
             return 1.0;
         }
         f32::from(

@@ -24,9 +24,9 @@ impl<M: DriveProtocol> CanDevice for Actuator<M> {
 
     #[inline]
     fn update(&mut self, tick: Tick) {
-        let (step, now) = (TimeStep::of_motor(tick.dt_s()), tick.now());
+        let (mut step, now) = (TimeStep::of_motor(tick.dt_s()), tick.now());
         let goes_on = self.goes_on(step, now);
-        if goes_on || self.decide(step, now) {
+        if goes_on || self.decide(&mut step, now) {
             if self.offered.waits {
                 self.withdraw();
             }

@@ -35,6 +35,7 @@ impl<M: DriveProtocol> Actuator<M> {
     fn hear(&mut self, is_usual: bool, now: Instant) {
         self.is_steady &= is_usual;
         let gap_us = self.guard.gap_us(now);
+        let is_silence = self.guard.is_silence(gap_us.unwrap_or(0));
         self.watch.hear(gap_us, now);
         self.guard.hear(now);
         let has_reset = self.power.hear(self.motor.is_enabled(), now);
@@ -42,7 +43,6 @@ impl<M: DriveProtocol> Actuator<M> {
             self.watch.fail(&mut self.guard, now);
         }
         let gap_us = gap_us.unwrap_or(0);
-        let is_silence = self.guard.device.timeouts().is_silence(gap_us);
         if has_reset || is_silence {
             self.motor.forget_settings();
             self.watch.forget_drive();
@@ -67,6 +67,7 @@ impl<M: DriveProtocol> Actuator<M> {
                 self.target = self.target.moved(turns);
                 self.start.turn(turns);
                 self.guard.pause();
+                self.is_steady = false;
             }
             Some(_) => {}
         }
@@ -155,7 +156,7 @@ impl<M: DriveProtocol> Actuator<M> {
     /// and with the share found here.
     #[cold]
     #[inline(never)]
-    pub(super) fn decide(&mut self, step: TimeStep, now: Instant) -> bool {
+    pub(super) fn decide(&mut self, step: &mut TimeStep, now: Instant) -> bool {
         let was_steady = core::mem::replace(&mut self.is_steady, false);
         if self.guard.has_target() && !self.motor.capabilities().has(self.kind) {
             self.guard.relax();
@@ -214,18 +215,20 @@ impl<M: DriveProtocol> Actuator<M> {
     }
 
     /// Finds what the drive is told of the target, and the share of the output, of which the conditions leave so much.
-    fn follow(&mut self, left: f32, step: TimeStep) {
-        if self.guard.end_rest() == Rest::Relaxed {
-            self.relax();
+    fn follow(&mut self, left: f32, step: &mut TimeStep) {
+        match self.guard.end_rest() {
+            Rest::Relaxed => self.relax(),
+            Rest::Pause => *step = step.frozen(),
+            Rest::None => {}
         }
         // Without an earlier command nothing is known of the load.
         if core::mem::take(&mut self.is_resting) {
             self.reopen();
         }
-        self.share = self.guard.share_of(left);
+        (_, self.share) = self.guard.range(left);
         let opened = self.guard.share();
         if opened < 1.0 || self.watch.soft_limits().is_some() {
-            self.narrow(opened, step);
+            self.narrow(opened, *step);
             return;
         }
         self.keep_on(self.share, self.has_nothing_due() && !self.joint.awaits_zero());

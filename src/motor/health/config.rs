@@ -82,6 +82,15 @@ impl HealthConfig {
     /// no limit.
     #[must_use]
     pub const fn with_reaction(mut self, condition: Condition, reaction: Reaction) -> Self {
+        const OWN_RULES: Conditions = Conditions::NONE
+            .with(Condition::Late)
+            .with(Condition::Offline)
+            .with(Condition::CommandLost)
+            .with(Condition::SoftLimit)
+            .with(Condition::PositionUncertain);
+        if OWN_RULES.contains(condition) {
+            return self;
+        }
         self.ignored = self.ignored.without(condition);
         self.relaxing = self.relaxing.without(condition);
         match reaction {
@@ -280,6 +289,17 @@ mod tests {
         }
         assert_eq!(config().validate(), Ok(()));
         assert_eq!(config().with_stall(1.0, 0.5, Duration::MAX).validate(), Ok(()));
+    }
+
+    #[test]
+    fn what_has_a_rule_of_its_own_has_no_reaction() {
+        use Condition::{CommandLost, Late, Offline, PositionUncertain, SoftLimit};
+        for condition in [Late, Offline, CommandLost, SoftLimit, PositionUncertain] {
+            for reaction in [Reaction::Ignore, Reaction::Relax] {
+                let config = HealthConfig::new().with_reaction(condition, reaction);
+                assert_eq!(config, HealthConfig::new(), "{condition}");
+            }
+        }
     }
 
     #[test]

@@ -290,8 +290,9 @@ impl<const N: usize> DeviceGuard<N> {
         begin: impl Fn(&mut M),
     ) -> bool {
         let waits = |device: &Self, index, motor: &mut M| {
-            let is_chosen = is_chosen(index, motor);
-            is_chosen && !motor.guard().is_armed() && !device.misses(motor.guard(), now)
+            is_chosen(index, motor)
+                && !motor.guard().is_armed()
+                && !device.misses(motor.guard(), now)
         };
         let has_waiting = (0..).zip(&mut *motors).any(|(index, motor)| waits(self, index, motor));
         if !has_waiting || self.is_stopped || !self.gesture.take() {

@@ -24,7 +24,8 @@ pub(crate) struct MotorGuard {
     opened: u32,
     /// Time in which the output range opens.
     opening_ms: u16,
-    is_opening: bool,
+    /// Less than the whole output range is open.
+    pub(crate) is_opening: bool,
     good_frames: u8,
     /// Whether the motor has feedback.
     pub(super) listens: bool,
@@ -123,7 +124,6 @@ impl MotorGuard {
     }
 
     /// Tells what an update does, once ages are compared and the health is checked; `held` is `None` in an update with a usable step.
-    #[inline]
     pub(crate) fn turn(&self, held: Option<Hold>) -> Turn {
         match held {
             _ if !self.drives() => Turn::Rest,
@@ -166,7 +166,6 @@ impl MotorGuard {
     }
 
     /// Notes feedback of an online motor, if the previous feedback and update are recent; otherwise does nothing and returns `false`.
-    #[inline]
     pub(crate) fn hear_soon(&mut self, now: u32, updated: u32, timeouts: &Timeouts) -> bool {
         let is_soon = |before| now.wrapping_sub(before) <= timeouts.late_us();
         let is_usual = self.link == Link::Online && is_soon(self.heard) && is_soon(updated);
@@ -231,7 +230,7 @@ impl MotorGuard {
     }
 
     /// Discards an expired target.
-    pub(crate) fn forget_target(&mut self) {
+    fn forget_target(&mut self) {
         self.relax();
         self.latch.set(Condition::CommandLost, true);
         self.forgotten_targets = self.forgotten_targets.saturating_add(1);
@@ -295,6 +294,14 @@ impl MotorGuard {
             self.relax();
         }
         target.ok_or(TargetError::NotHomed)
+    }
+
+    /// Refuses a target measured at an unknown time, which is `None`: the target before expires.
+    pub(crate) fn require_fresh(&mut self, stamp: Option<u32>) -> Result<u32, TargetError> {
+        if stamp.is_none() && self.has_target {
+            self.forget_target();
+        }
+        stamp.ok_or(TargetError::StaleMeasurement)
     }
 
     /// Tells whether a target may replace an earlier one: a motor with a target is armed.
@@ -364,11 +371,6 @@ impl MotorGuard {
     pub(crate) const fn open(&mut self, now: u32) {
         self.is_opening = true;
         self.opened = now;
-    }
-
-    /// Tells whether less than the whole output range is open.
-    pub(crate) const fn is_opening(&self) -> bool {
-        self.is_opening
     }
 
     /// Returns the open share of the output range, 0 to 1; 0 for a time before the beginning.

@@ -45,7 +45,7 @@ impl Slot {
         let gap_us = now.since(self.heard).micros_u32().unwrap_or(u32::MAX);
         let link = self.guard.link();
         let was_heard = !matches!(link, Link::Unheard | Link::Offline);
-        let is_silence = was_heard && rules.timeouts().is_silence(gap_us);
+        let is_silence = self.guard.is_silence(gap_us, rules.timeouts());
         let is_further = |before| way(before, raw) > furthest(self, before, gap_us as f32 * 1e-6);
         if was_heard && self.raw.is_some_and(is_further) {
             self.position_jumps = self.position_jumps.saturating_add(1);
@@ -62,7 +62,7 @@ impl Slot {
             }
             self.traffic.count();
             rules.hear(self, self.place(), now, |slot| {
-                if is_silence || link == Link::Offline {
+                if is_silence {
                     slot.lose_zero();
                 }
             });
