@@ -89,12 +89,7 @@ impl Guard {
     #[inline]
     pub(crate) fn gap_us(&self, now: Instant) -> Option<u32> {
         let is_heard = self.motor.link() != Link::Unheard;
-        is_heard.then(|| age(now.stamp(), self.motor.heard()))
-    }
-
-    /// Tells whether a drive may have started again in this gap before feedback.
-    pub(crate) fn is_silence(&self, gap_us: u32) -> bool {
-        self.motor.is_silence(gap_us, self.device.timeouts())
+        is_heard.then(|| age(now.stamp(), self.motor.heard))
     }
 
     /// Notes that the angle counts from an unknown zero, and [trips](Self::relax_until_armed).
@@ -179,8 +174,12 @@ impl Guard {
 
     /// Tells what the tick does, after [`pass`](Self::pass) and the checks of the health.
     #[inline]
-    pub(crate) fn turn(&self, held: Option<Hold>) -> Turn {
-        self.motor.turn(held)
+    pub(crate) fn turn(&mut self, held: Option<Hold>) -> Turn {
+        let turn = self.motor.turn(held);
+        if turn == Turn::Rest && !self.motor.has_target() {
+            self.motor.relax();
+        }
+        turn
     }
 
     /// Notes a pause: the last command is not sent again.

@@ -121,7 +121,8 @@ impl Watch {
     }
 
     /// Trips the motor as by a fault that the drive reports in one update.
-    pub(crate) fn fail(&self, guard: &mut Guard, now: Instant) {
+    pub(crate) fn fail(&mut self, guard: &mut Guard, error_code: u8, now: Instant) {
+        self.error_code = error_code;
         guard.change(now, |motor| motor.fail(self.config));
     }
 
@@ -133,7 +134,8 @@ impl Watch {
     /// Begins anew before the motor is driven.
     pub(crate) fn start(&mut self, guard: &mut Guard, motor: MotorName, now: Instant) {
         self.part = motor.id();
-        self.next = self.after(now);
+        // What is left of the output is found with the first update.
+        (self.checked, self.next) = (now, now);
         // Another drive may come while nobody counts.
         self.forget_drive();
         guard.change_conditions(now, |latch| self.monitor.start(latch));

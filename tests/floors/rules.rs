@@ -42,7 +42,6 @@ const AGES: Seeds<'static> = Seeds {
         "first_time",
         "furthest",
         "gap_us",
-        "heard",
         "held_steps",
         "last_time",
         "now",
@@ -55,7 +54,7 @@ const AGES: Seeds<'static> = Seeds {
         "time_of",
         "updated",
     ],
-    names: &["now"],
+    names: &["now", "heard"],
     types: &["Instant", "Tick"],
 };
 

@@ -14,8 +14,8 @@ pub(in crate::dji) fn receive(
     timeouts: &Timeouts,
     running: bool,
 ) {
-    let (link, gap_us) = (slot.guard.link(), age(now, slot.guard.heard()));
-    let in_time = now.wrapping_sub(slot.guard.heard()) < trusted_gap_us(facts);
+    let (link, gap_us) = (slot.guard.link(), age(now, slot.guard.heard));
+    let in_time = now.wrapping_sub(slot.guard.heard) < trusted_gap_us(facts);
     if link != Link::Unheard {
         slot.traffic.gap(gap_us);
     }

@@ -230,6 +230,7 @@ impl Slot {
     /// Begins the action after a rest.
     fn end_rest(&mut self) {
         self.rest_loops();
+        self.guard.end_rest();
         self.acted = Action::Rest;
         self.duty = Duty::Other;
         self.apply_rules();
@@ -237,7 +238,7 @@ impl Slot {
 
     /// Resets or interrupts the loops, by the kind of the rest.
     pub(super) fn rest_loops(&mut self) {
-        match self.guard.end_rest() {
+        match self.guard.rest {
             Rest::Relaxed => self.reset_loops(),
             Rest::Pause => self.interrupt_loops(),
             Rest::None => {}

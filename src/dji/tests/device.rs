@@ -92,3 +92,26 @@ fn a_device_that_is_disarmed_takes_no_target() {
     disarm(&mut bus);
     assert_eq!(bus.set_raw(wheel, 1), Err(TargetError::Disarmed));
 }
+
+/// A motor that takes targets again by itself is armed: a request ends the trip of its bus.
+#[test]
+fn a_request_to_arm_is_granted_again_after_a_motor_has_resumed() {
+    let (mut bus, _) = armed([Config::<M3508>::at_once(1).with_resume()]);
+    let run = |bus: &mut Bus, to_ms: u64, ms: &mut u64| {
+        while *ms < to_ms {
+            *ms += 1;
+            _ = bus.ingest(&feedback(0x201, 0, 0), at_ms(*ms));
+            step(bus, *ms);
+        }
+    };
+    let mut ms = 1;
+    run(&mut bus, 50, &mut ms);
+    ms = 300; // silent meanwhile
+    step(&mut bus, ms);
+    assert!(!bus.is_armed());
+    run(&mut bus, 420, &mut ms);
+    assert!(bus.is_armed());
+    assert_eq!(bus.arm(at_ms(ms)), Ok(()));
+    run(&mut bus, 430, &mut ms);
+    assert_eq!(bus.arm(at_ms(ms)), Ok(()), "10 ms later");
+}

@@ -222,3 +222,20 @@ fn what_is_replaced_before_it_is_done_leaves_the_loops_as_they_are() {
         }
     }
 }
+
+/// A change of gains ends no rest: a command that was discarded is no start for a loop.
+#[test]
+fn gains_set_between_a_refused_target_and_a_good_one_start_from_zero() {
+    for dt_s in [0.001, 0.0] {
+        let mut bench = yaw();
+        bench.run(20, STILL, 5_000);
+        let yaw = bench.motor;
+        bench.ms += 1;
+        bench.hear(STILL);
+        bench.bus.relax(yaw);
+        bench.bus.set_speed_loop(yaw, PI).unwrap();
+        bench.bus.set_velocity(yaw, AngularVelocity::ZERO).unwrap();
+        bench.bus.update(Tick::new(at_ms(bench.ms), dt_s));
+        assert!(sent(&mut bench.bus).iter().all(|(_, words)| *words == [0; 4]), "{dt_s}");
+    }
+}

@@ -35,12 +35,13 @@ impl<M: DriveProtocol> Actuator<M> {
     fn hear(&mut self, is_usual: bool, now: Instant) {
         self.is_steady &= is_usual;
         let gap_us = self.guard.gap_us(now);
-        let is_silence = self.guard.is_silence(gap_us.unwrap_or(0));
+        let is_silence =
+            self.guard.motor.is_silence(gap_us.unwrap_or(0), self.guard.device.timeouts());
         self.watch.hear(gap_us, now);
         self.guard.hear(now);
         let has_reset = self.power.hear(self.motor.is_enabled(), now);
         if has_reset {
-            self.watch.fail(&mut self.guard, now);
+            self.watch.fail(&mut self.guard, self.motor.vitals().error_code, now);
         }
         let gap_us = gap_us.unwrap_or(0);
         if has_reset || is_silence {
@@ -310,7 +311,7 @@ impl<M: DriveProtocol> Actuator<M> {
 
     fn enable(&mut self, now: Instant) {
         if self.motor.wrong_setting().is_some_and(|wrong| wrong.found.is_some()) {
-            self.watch.fail(&mut self.guard, now);
+            self.watch.fail(&mut self.guard, self.motor.vitals().error_code, now);
             return;
         }
         // Of several frames none is left out: the one before still waits for the bus.

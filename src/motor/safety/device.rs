@@ -289,21 +289,24 @@ impl<const N: usize> DeviceGuard<N> {
         is_chosen: impl Fn(u8, &M) -> bool,
         begin: impl Fn(&mut M),
     ) -> bool {
-        let waits = |device: &Self, index, motor: &mut M| {
-            is_chosen(index, motor)
-                && !motor.guard().is_armed()
-                && !device.misses(motor.guard(), now)
+        let waits = |index, motor: &mut M| is_chosen(index, motor) && !motor.guard().is_armed();
+        let may_begin = |device: &Self, index, motor: &mut M| {
+            waits(index, motor) && !device.misses(motor.guard(), now)
         };
-        let has_waiting = (0..).zip(&mut *motors).any(|(index, motor)| waits(self, index, motor));
-        if !has_waiting || self.is_stopped || !self.gesture.take() {
+        let begins = (0..).zip(&mut *motors).any(|(index, motor)| may_begin(self, index, motor));
+        // Motors that take targets again by themselves end the trip too.
+        let is_due = begins || !(0..).zip(&mut *motors).any(|(index, motor)| waits(index, motor));
+        if !is_due || self.is_stopped || !self.gesture.take() {
             return false;
         }
-        self.now = now.stamp();
-        // An arming at an earlier time changes nothing: running motors may have targets of the later one.
-        self.armed_at = self.armed_at.max(now);
-        self.disturb();
+        if begins {
+            self.now = now.stamp();
+            // An arming at an earlier time changes nothing: running motors may have targets of the later one.
+            self.armed_at = self.armed_at.max(now);
+            self.disturb();
+        }
         for (index, motor) in (0..).zip(&mut *motors) {
-            if waits(self, index, motor) {
+            if may_begin(self, index, motor) {
                 self.change(motor, index, now, |motor| {
                     motor.guard().engage(now.stamp());
                     begin(motor);
@@ -313,7 +316,7 @@ impl<const N: usize> DeviceGuard<N> {
         if motors.iter_mut().any(|motor| motor.guard().is_tripped()) {
             (self.gesture.tripped, self.gesture.granted) = (true, false);
         }
-        true
+        begins
     }
 
     /// Begins the pause after a trip. Each update counts towards it.

@@ -11,7 +11,7 @@ use crate::time::Duration;
 #[repr(C)]
 pub(crate) struct MotorGuard {
     /// Stamp of the last feedback.
-    pub(super) heard: u32,
+    pub(crate) heard: u32,
     /// Feedback in time, after the trusted gap, which is 0 unless online.
     pub(crate) in_time: InTime,
     /// Stamp of the target.
@@ -19,7 +19,7 @@ pub(crate) struct MotorGuard {
     pub(super) link: Link,
     arming: Arming,
     pub(super) has_target: bool,
-    rest: Rest,
+    pub(crate) rest: Rest,
     /// Stamp of the time when the output range began to open.
     opened: u32,
     /// Time in which the output range opens.
@@ -93,11 +93,6 @@ impl MotorGuard {
 
     pub(crate) const fn link(&self) -> Link {
         self.link
-    }
-
-    /// Returns the stamp of the last feedback.
-    pub(crate) const fn heard(&self) -> u32 {
-        self.heard
     }
 
     /// Tells whether the last feedback is at most `micros` old.

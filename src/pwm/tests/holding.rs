@@ -168,3 +168,25 @@ fn a_good_velocity_behind_a_refused_one_starts_the_loop_afresh() {
     let afresh = step(201, Some(f32::NAN));
     assert!(last > 1.2 * first && (afresh - first).abs() < 1e-6, "{first}, {last}, {afresh}");
 }
+
+/// The shaft is held, and its counts are late: a target that is refused meanwhile takes the integral with it.
+#[test]
+fn a_target_refused_while_counts_are_late_starts_the_loop_afresh() {
+    let log = Log::default();
+    let mut motor = integrator(&log);
+    let rad_per_s = AngularVelocity::from_rad_per_s;
+    for ms in 1..=300 {
+        motor.ingest_counts(0, at_ms(ms));
+        motor.set_velocity((), rad_per_s(100.0)).unwrap();
+        motor.update(tick(ms)).unwrap();
+    }
+    assert!(motor.duty() > 0.02, "{}", motor.duty());
+    for ms in 301..=350 {
+        _ = motor.set_velocity((), AngularVelocity::ZERO);
+        motor.update(tick(ms)).unwrap();
+    }
+    motor.ingest_counts(0, at_ms(351));
+    motor.set_velocity((), AngularVelocity::ZERO).unwrap();
+    motor.update(tick(351)).unwrap();
+    assert!(motor.duty().abs() < 1e-6, "{}", motor.duty());
+}

@@ -35,10 +35,10 @@ impl Reference {
     }
 
     pub(crate) fn engage(&mut self, now: u64) {
+        self.tripped = false;
         if self.is_armed() {
             return;
         }
-        self.tripped = false;
         self.relax();
         self.arming = Arming::Armed;
         (self.is_resting, self.was_driven) = (true, false);
