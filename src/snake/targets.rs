@@ -18,7 +18,7 @@ use crate::units::AngularVelocity;
 impl Joints {
     /// Sets the position to go to, from the joint's zero. Saturates at the ±32768 turns of the joint's counter.
     ///
-    /// Costs 87 instructions on a Cortex-M4F (`docs/figures.md`).
+    /// Costs 90 instructions on a Cortex-M4F (`docs/figures.md`).
     ///
     /// # Errors
     /// Fails unless the joint is attached, armed and online, for NaN and infinity, and as [`TargetError::NotHomed`] after a loss of the zero.

@@ -28,9 +28,9 @@ const ORDERS: u8 = 50;
 
 /// A motor on a VESC, in a control mode: see the [module](super).
 ///
-/// Costs 3800 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
+/// Costs 3802 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
 ///
-/// Costs 144 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
+/// Costs 145 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
 ///
 /// # Examples
 /// ```
