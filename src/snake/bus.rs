@@ -131,7 +131,8 @@ impl Joints {
     /// Costs 240 instructions on a Cortex-M4F (`docs/figures.md`).
     pub fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
         let index = frame.header().wrapping_sub(1) as usize;
-        if index < SLOTS && !self.guard.is_running() {
+        let is_attached = self.slots.get(index).is_some_and(|slot| slot.id.is_some());
+        if is_attached && !self.guard.is_running() {
             self.guard.pass_unwatched(&mut self.slots, now);
         }
         let Some(slot) = self.slots.get_mut(index) else { return Ingest::Unrelated };

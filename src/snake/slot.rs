@@ -95,7 +95,7 @@ struct Standing {
 }
 
 /// The common rules of the joints. So many unread edges have an order and a time of their own.
-pub(super) type Rules = DeviceGuard<24>;
+pub(super) type Rules = DeviceGuard<48>;
 
 impl Guarded for Slot {
     fn guard(&mut self) -> &mut MotorGuard {

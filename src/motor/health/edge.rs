@@ -133,8 +133,9 @@ impl<const N: usize> Journal<N> {
 
     fn push(&mut self, motor: u8, condition: Condition, began: bool, at: u32) {
         let index = self.index(self.length);
-        if usize::from(self.length) >= N {
-            self.is_overfull = true;
+        // Until all are read: an entry now would be read before the changes without one.
+        self.is_overfull |= usize::from(self.length) >= N;
+        if self.is_overfull {
             return;
         }
         if let (Some(time), Some(what)) = (self.at.get_mut(index), self.what.get_mut(index)) {
@@ -295,6 +296,39 @@ mod tests {
             [start + Duration::from_secs(24 * 86_400), Instant::from_micros((1 << 40) - 900)]
         {
             assert_eq!(fine(entry.at, later), start);
+        }
+    }
+
+    /// Two motors and room for one: late and heard again without room, and late once more when the first edge is read.
+    #[test]
+    fn a_change_is_read_behind_those_that_found_no_room_before() {
+        let mut journal = Journal::<1>::EMPTY;
+        let mut motors = [One(Latch::NONE), One(Latch::NONE)];
+        let mut set = |journal: &mut Journal<1>, motors: &mut [One; 2], motor: u8, holds| {
+            let latch = &mut motors[usize::from(motor)].0;
+            let before = *latch;
+            latch.set(Condition::Late, holds);
+            journal.note(motor, &before, latch, NOW);
+        };
+        set(&mut journal, &mut motors, 0, true);
+        set(&mut journal, &mut motors, 1, true);
+        let mut read = |journal: &mut Journal<1>, motors: &mut [One; 2]| {
+            let edge = journal.next_edge(motors, NOW)?;
+            Some((edge.source, edge.began))
+        };
+        assert_eq!(read(&mut journal, &mut motors), Some((0, true)));
+        set(&mut journal, &mut motors, 1, false);
+        let rest = core::array::from_fn(|_| read(&mut journal, &mut motors));
+        assert_eq!(rest, [Some((1, true)), Some((1, false)), None]);
+        set(&mut journal, &mut motors, 1, true);
+        assert_eq!(read(&mut journal, &mut motors), Some((1, true)), "room again");
+    }
+
+    struct One(Latch);
+
+    impl Latched for One {
+        fn latch(&mut self) -> &mut Latch {
+            &mut self.0
         }
     }
 

@@ -280,8 +280,8 @@ impl<const N: usize> DeviceGuard<N> {
     }
 
     /// Arms each chosen motor that is online and not armed yet, and lets each `begin`; an armed motor goes on undisturbed. While the emergency stop
-    /// is set, or without a request that counts, no motor is armed. Otherwise the trip ends, unless a motor still waits to be armed. Returns
-    /// whether a motor was armed.
+    /// is set, or without a request that counts, no motor is armed. Otherwise the trip ends, unless a tripped motor is left. Returns whether a
+    /// motor was armed.
     pub(crate) fn engage<M: Guarded>(
         &mut self,
         motors: &mut [M],

@@ -22,7 +22,7 @@ impl Snake {
 impl Subject<1> for Snake {
     const RULES: [Rules; 1] = [Rules {
         late_us: Some(40_000),
-        room: 24,
+        room: 48,
         loses_zero: true,
         opens: Opens::Never,
         rivals: Rivals::Reported,
