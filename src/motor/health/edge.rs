@@ -134,8 +134,8 @@ impl<const N: usize> Journal<N> {
     fn push(&mut self, motor: u8, condition: Condition, began: bool, at: u32) {
         let index = self.index(self.length);
         // Until all are read: an entry now would be read before the changes without one.
-        self.is_overfull |= usize::from(self.length) >= N;
-        if self.is_overfull {
+        if self.is_overfull || usize::from(self.length) >= N {
+            self.is_overfull = true;
             return;
         }
         if let (Some(time), Some(what)) = (self.at.get_mut(index), self.what.get_mut(index)) {
@@ -304,7 +304,7 @@ mod tests {
     fn a_change_is_read_behind_those_that_found_no_room_before() {
         let mut journal = Journal::<1>::EMPTY;
         let mut motors = [One(Latch::NONE), One(Latch::NONE)];
-        let mut set = |journal: &mut Journal<1>, motors: &mut [One; 2], motor: u8, holds| {
+        let set = |journal: &mut Journal<1>, motors: &mut [One; 2], motor: u8, holds| {
             let latch = &mut motors[usize::from(motor)].0;
             let before = *latch;
             latch.set(Condition::Late, holds);
@@ -312,7 +312,7 @@ mod tests {
         };
         set(&mut journal, &mut motors, 0, true);
         set(&mut journal, &mut motors, 1, true);
-        let mut read = |journal: &mut Journal<1>, motors: &mut [One; 2]| {
+        let read = |journal: &mut Journal<1>, motors: &mut [One; 2]| {
             let edge = journal.next_edge(motors, NOW)?;
             Some((edge.source, edge.began))
         };
