@@ -389,24 +389,24 @@ impl Story {
 
     /// The joints were armed: those that were not before begin.
     fn engaged(&mut self, before: [bool; 3]) {
-        for (index, known) in self.known.iter_mut().enumerate().filter(|(it, _)| !before[*it]) {
-            if self.joints.is_joint_armed(self.handles[index]) {
+        for (index, known) in self.known.iter_mut().enumerate() {
+            known.stamp = known.stamp.max(self.now);
+            known.armed_at = known.armed_at.max(self.now);
+            if !before[index] && self.joints.is_joint_armed(self.handles[index]) {
                 known.gesture.grant(false);
-                known.stamp = known.stamp.max(self.now);
-                known.armed_at = known.armed_at.max(self.now);
                 known.lost_time = false;
             }
         }
     }
 
     /// I4: where time did not move on, nothing moves, no joint is armed, and no feedback is fresh.
-    fn lose_time(&mut self, is_lost: impl Fn(&Known) -> bool) {
+    fn lose_time(&mut self) {
         for (known, handle) in self.known.iter_mut().zip(&self.handles) {
-            if !is_lost(known) || self.joints.link(*handle).is_none() {
+            (known.stamp, known.armed_at) = (self.now, 0);
+            if self.joints.link(*handle).is_none() {
                 continue;
             }
             known.lose_time();
-            (known.stamp, known.armed_at) = (self.now, 0);
             assert!(!self.joints.is_joint_armed(*handle), "I4: armed without time: {known:?}");
             let is_fresh = self.joints.link(*handle) == Some(Link::Online);
             assert!(!is_fresh, "I4: fresh without time: {known:?}");
@@ -424,7 +424,8 @@ impl Story {
         let bad_steps = self.joints.counters().bad_steps;
         self.joints.update(Tick::new(Instant::from_micros(self.now), dt_s));
         let holds = self.joints.counters().bad_steps != bad_steps;
-        let is_lost = self.updated.is_some_and(|updated| self.now <= updated);
+        let is_armed_later = self.known.iter().any(|known| self.now < known.armed_at);
+        let is_lost = is_armed_later || self.updated.is_some_and(|updated| self.now <= updated);
         let step = self.updated.map_or(0, |updated| self.now.saturating_sub(updated));
         self.updated = Some(self.now);
         for known in &mut self.known {
@@ -432,7 +433,7 @@ impl Story {
         }
         assert!(holds || !is_lost, "time does not move on at {}", self.now);
         if is_lost {
-            self.lose_time(|_| true);
+            self.lose_time();
         }
         let stands = self.now <= self.clock;
         let is_late = self.now.saturating_sub(self.clock) > LATE_US;
@@ -458,7 +459,6 @@ impl Story {
         if !holds {
             self.tick = self.now;
             let now = self.now;
-            self.lose_time(|known| now < known.armed_at);
             for (known, handle) in self.known.iter_mut().zip(&self.handles) {
                 // Its feedback or its target is too old, say.
                 if !self.joints.state(*handle).is_some_and(|state| state.is_driven) {

@@ -326,7 +326,7 @@ fn run<S: Subject<N>, const N: usize>(name: &str, clocks: u64, make: impl Fn(Set
     let often = if is_prepared { clocks / 2 } else { clocks };
     let trips = if is_prepared { clocks / 20 } else { clocks / 10 };
     assert!(driven > often && driven_again > clocks / 50 && tripped > trips, "{name}");
-    assert!(repeated > clocks / 25 && armed_again > clocks / 100, "{name}");
+    assert!(repeated > clocks / 35 && armed_again > clocks / 100, "{name}");
     let listens = S::RULES.iter().any(|rules| rules.late_us.is_some());
     assert!(!listens || offline > clocks / 20 && recovered > clocks / 100, "{name}");
     assert!(seen.edges > clocks, "{name}");

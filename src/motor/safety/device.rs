@@ -299,12 +299,10 @@ impl<const N: usize> DeviceGuard<N> {
         if !is_due || self.is_stopped || !self.gesture.take() {
             return false;
         }
-        if begins {
-            self.now = now.stamp();
-            // An arming at an earlier time changes nothing: running motors may have targets of the later one.
-            self.armed_at = self.armed_at.max(now);
-            self.disturb();
-        }
+        self.now = now.stamp();
+        // An arming at an earlier time changes nothing: running motors may have targets of the later one.
+        self.armed_at = self.armed_at.max(now);
+        self.disturb();
         for (index, motor) in (0..).zip(&mut *motors) {
             if may_begin(self, index, motor) {
                 self.change(motor, index, now, |motor| {

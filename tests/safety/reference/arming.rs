@@ -36,13 +36,12 @@ impl Reference {
 
     pub(crate) fn engage(&mut self, now: u64) {
         self.tripped = false;
-        if self.is_armed() {
-            return;
+        if !self.is_armed() {
+            self.relax();
+            self.arming = Arming::Armed;
+            (self.is_resting, self.was_driven) = (true, false);
+            self.open(now);
         }
-        self.relax();
-        self.arming = Arming::Armed;
-        (self.is_resting, self.was_driven) = (true, false);
-        self.open(now);
         self.armed_at = self.armed_at.max(now);
         self.target_time = now;
     }
