@@ -746,8 +746,9 @@ impl Judged {
         let was_armed = self.bench.own.is_armed();
         if self.bench.own.arm(now).is_ok() {
             assert!(!self.is_stopped && self.heard.is_some());
+            self.now = self.now.max(self.bench.micros);
             if !was_armed {
-                (self.now, self.target) = (self.now.max(self.bench.micros), None);
+                self.target = None;
             }
             self.is_armed = true;
         }

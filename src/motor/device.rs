@@ -88,7 +88,7 @@ pub trait CanDevice {
     /// less than 100 ms of updates back.
     fn ask(&mut self) -> bool;
 
-    /// Allows targets from now on, for the motors with feedback; an armed motor continues undisturbed. Called by
+    /// Allows targets from now on, for the motors with feedback; an armed motor keeps its target. Called by
     /// [`arm`](super::Devices::arm) when all of its conditions hold; without effect while the emergency stop is set, and,
     /// after a trip, unless the last request [counted](Self::ask).
     fn engage(&mut self, now: Instant);

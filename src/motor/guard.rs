@@ -1,4 +1,4 @@
-//! Rules of a motor that is a device by itself, and feedback of the motors of any device.
+//! Rules of a motor that is a device by itself, and feedback of a motor and of a joint of `snake`.
 
 use super::age;
 use super::safety::{DeviceGuard, Guarded, Hold, MotorGuard, OPENING, Rest, Turn};
@@ -172,7 +172,7 @@ impl Guard {
         None
     }
 
-    /// Tells what the tick does, after [`pass`](Self::pass) and the checks of the health.
+    /// Tells what the tick does, after [`pass`](Self::pass) and the health; at rest without a target, the loops will start afresh.
     #[inline]
     pub(crate) fn turn(&mut self, held: Option<Hold>) -> Turn {
         let turn = self.motor.turn(held);
@@ -258,7 +258,7 @@ impl Guard {
     }
 
     /// Allows targets from now on, beginning without a target, if the motor is online and, after a trip, the last request
-    /// [counts](Self::ask). An armed motor goes on undisturbed. While stopped, `engage` has no effect. Returns whether the motor was armed.
+    /// [counts](Self::ask). An armed motor keeps its target; later targets have the time `now`, and an update before `now` trips. While stopped, `engage` has no effect. Returns whether the motor was armed.
     pub fn engage(&mut self, now: Instant) -> bool {
         let motors = core::slice::from_mut(&mut self.motor);
         self.device.engage(motors, now, |_, _| true, |_| {})

@@ -1,4 +1,4 @@
-//! Health of one motor outside of a bus: its vitals, their checks, and its conditions.
+//! Health of one motor outside of a bus: its checks and conditions; and what a condition does to any motor.
 
 use super::{
     Answers, Condition, Conditions, Guard, Health, HealthConfig, Latch, Link, Monitor, MotorGuard,

@@ -177,7 +177,7 @@ impl Joints {
 
     /// Chooses the joints for requests and writes, and relaxes joints that may not be driven.
     ///
-    /// An update that does not lie after the previous one relaxes every joint until armed again. A `dt_s` of zero, below zero, infinite or
+    /// An update before the arming, or not after the previous one, relaxes every joint until armed again. A `dt_s` of zero, below zero, infinite or
     /// NaN chooses no joint for one update; a second such update in a row, or a late one, disables all joints until the next usable step.
     /// Frames that disable a joint are sent nevertheless.
     ///

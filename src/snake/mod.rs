@@ -29,7 +29,7 @@
 //!
 //! * to every joint with the first update, so that after a reset of the controller no joint goes on with an earlier command;
 //! * at once, before all else and to all joints, on emergency stop, disarming, a fault, lost feedback, an expired target, a
-//!   target that is not finite, a bad time step, zeroing, detaching: at most 12 frames, 1.4 ms of the bus;
+//!   target that is not finite, a second bad time step in a row or a late one, zeroing, detaching: at most 12 frames, 1.4 ms of the bus;
 //! * again each 100 ms while a joint is relaxed: a drive may have missed the frame.
 //!
 //! A relaxed joint is always disabled before the next bring-up, for any cause and after any time, even if armed before the next update. The

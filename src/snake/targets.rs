@@ -183,7 +183,7 @@ impl Joints {
     /// Returns the oldest unread edge of a joint.
     ///
     /// No edge is lost, however late it is read. While an edge waits, the same change is not noted again. If more than 48 edges wait, the later
-    /// edges have the time of the last of these.
+    /// ones, until all are read, come in the order of the joints, with the time of the last of these.
     ///
     /// # Examples
     /// ```

@@ -65,7 +65,7 @@ pub struct Edge<C, S = ()> {
     /// Time of the beginning, the first since the last reading; or of the end, the last.
     ///
     /// For a motor: time of detection, rounded down to 1.024 ms, up to an age of 24 days. If more edges wait than the owner of the motor
-    /// has times for (12 for a [`Bus`](crate::dji::Bus), 6 for a motor outside of a bus and for a joint), the later edges have the last
+    /// has times for (12 for a [`Bus`](crate::dji::Bus), 48 for a bus of joints, 6 for a motor outside of a bus), the later edges have the last
     /// time kept: they came later.
     pub at: Instant,
 }

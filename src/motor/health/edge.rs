@@ -88,7 +88,7 @@ pub(crate) trait Latched {
 
 /// Times of the unread changes in the order of detection, as long as there is room.
 ///
-/// A change without room stays latched: only its time is lost.
+/// A change without room, and each one after it until all are read, stays latched: only its time and its place in the order are lost.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Journal<const N: usize> {
     at: [u32; N],

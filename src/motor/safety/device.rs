@@ -17,7 +17,7 @@ pub(crate) struct DeviceGuard<const N: usize> {
     updated: Instant,
     /// Until this time no age exceeds its limit; from the beginning after a [disturbance](Self::disturb).
     quiet_until: Instant,
-    /// Time of the last arming: no update lies before it.
+    /// Time of the last granted request to arm, or of lost time: no update lies before it.
     armed_at: Instant,
     gesture: Gesture,
     /// Whether there was an update.
@@ -94,7 +94,8 @@ impl<const N: usize> DeviceGuard<N> {
     }
 
     /// Decides whether an update outside of a [quiet](Self::is_quiet) time, `before` being the time of the previous one, has a usable time
-    /// and step, and applies all due time-outs. If so, computes until when none is due again; if not, returns the [`Hold`].
+    /// and step. If time moved on, applies all due time-outs; with a usable step, computes until when none is due again; otherwise returns the
+    /// [`Hold`].
     pub(crate) fn pass<M: Guarded>(
         &mut self,
         motors: &mut [M],
@@ -171,7 +172,7 @@ impl<const N: usize> DeviceGuard<N> {
 
     /// Discards each stamp whose age a 32-bit counter can no longer represent; after a pause, discards all stamps.
     ///
-    /// Called wherever time passes without a comparison of ages.
+    /// Called after a pause, and with feedback before the first update.
     fn forget_bygones<M: Guarded>(&mut self, motors: &mut [M], before: Instant) {
         let (now, is_pause) = (self.updated.stamp(), self.is_pause(before));
         self.change_all(motors, self.updated, |motor| motor.guard().forget_bygones(now, is_pause));
@@ -279,9 +280,9 @@ impl<const N: usize> DeviceGuard<N> {
         self.gesture.ask()
     }
 
-    /// Arms each chosen motor that is online and not armed yet, and lets each `begin`; an armed motor goes on undisturbed. While the emergency stop
-    /// is set, or without a request that counts, no motor is armed. Otherwise the trip ends, unless a tripped motor is left. Returns whether a
-    /// motor was armed.
+    /// Arms each chosen motor that is online and not armed yet, and lets each `begin`; an armed motor keeps its target. While the emergency stop
+    /// is set, without a request that counts, or where none is online, nothing changes. Otherwise no update may lie before
+    /// `now`, later targets have this time, and the trip ends, unless a tripped motor is left. Returns whether a motor was armed.
     pub(crate) fn engage<M: Guarded>(
         &mut self,
         motors: &mut [M],
@@ -289,13 +290,10 @@ impl<const N: usize> DeviceGuard<N> {
         is_chosen: impl Fn(u8, &M) -> bool,
         begin: impl Fn(&mut M),
     ) -> bool {
-        let waits = |index, motor: &mut M| is_chosen(index, motor) && !motor.guard().is_armed();
-        let may_begin = |device: &Self, index, motor: &mut M| {
-            waits(index, motor) && !device.misses(motor.guard(), now)
+        let is_ready = |device: &Self, index, motor: &mut M| {
+            is_chosen(index, motor) && !device.misses(motor.guard(), now)
         };
-        let begins = (0..).zip(&mut *motors).any(|(index, motor)| may_begin(self, index, motor));
-        // Motors that take targets again by themselves end the trip too.
-        let is_due = begins || !(0..).zip(&mut *motors).any(|(index, motor)| waits(index, motor));
+        let is_due = (0..).zip(&mut *motors).any(|(index, motor)| is_ready(self, index, motor));
         if !is_due || self.is_stopped || !self.gesture.take() {
             return false;
         }
@@ -303,8 +301,10 @@ impl<const N: usize> DeviceGuard<N> {
         // An arming at an earlier time changes nothing: running motors may have targets of the later one.
         self.armed_at = self.armed_at.max(now);
         self.disturb();
+        let mut begins = false;
         for (index, motor) in (0..).zip(&mut *motors) {
-            if may_begin(self, index, motor) {
+            if is_ready(self, index, motor) && !motor.guard().is_armed() {
+                begins = true;
                 self.change(motor, index, now, |motor| {
                     motor.guard().engage(now.stamp());
                     begin(motor);

@@ -12,14 +12,14 @@
 //! | is the motor healthy? | `MotorGuard::judge`, `MotorGuard::react` | tripped, as configured; relaxed if no share of the output is left |
 //! | is the motor armed, by a gesture? | `MotorGuard::admit`, `DeviceGuard::engage` | no target is taken |
 //! | does a target from a zero have that zero? | `MotorGuard::require_zero` | relaxed, and the target is not taken |
-//! | does the motor go on from its last command? | `MotorGuard::turn`, `MotorGuard::end_rest` | no command is repeated, and the loops start afresh |
+//! | does the motor go on from its last command? | `MotorGuard::turn`, `MotorGuard::end_rest` | no command is repeated; the loops start afresh, or after a pause take no rate |
 //! | how far is the output range open, and which of its directions? | `MotorGuard::range` | that share of the full command |
 //!
-//! Ages are compared in each update whose time moved on, with a usable step or without. The first of some updates in a row without a usable step repeats
+//! Ages count in each update whose time moved on, with a usable step or without. The first of some updates in a row without a usable step repeats
 //! the last command of a motor without a rest since, unless the update itself is late.
 //!
 //! The [health](super::HealthConfig) of a family finds faults, heat and a stall, and says what a second master does; each acts by
-//! [`MotorGuard::trip`]. [`DeviceGuard::is_alone`] says when a second master is gone. The tables of links and of arming, with all
+//! [`MotorGuard::react`]. [`DeviceGuard::is_alone`] says when a second master is gone. The tables of links and of arming, with all
 //! transitions, stand in the documentation of [`motor`](super#states).
 //!
 //! Times of a motor are stamps of 32 bits. Ages of several motors are compared together: no motor is checked again before the
@@ -52,7 +52,7 @@ enum Arming {
 pub(crate) enum Rest {
     /// No rest.
     None,
-    /// The feedback was late: older measurements give no rate.
+    /// The feedback was late, or its count moved: older measurements give no rate.
     Pause,
     /// There was no target: the loops start afresh.
     Relaxed,

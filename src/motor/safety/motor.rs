@@ -12,7 +12,7 @@ use crate::time::Duration;
 pub(crate) struct MotorGuard {
     /// Stamp of the last feedback.
     pub(crate) heard: u32,
-    /// Feedback in time, after the trusted gap, which is 0 unless online.
+    /// The trusted gap, 0 unless online, and the count of feedback within it.
     pub(crate) in_time: InTime,
     /// Stamp of the target.
     pub(super) commanded: u32,
@@ -291,7 +291,7 @@ impl MotorGuard {
         target.ok_or(TargetError::NotHomed)
     }
 
-    /// Refuses a target measured at an unknown time, which is `None`: the target before expires.
+    /// Refuses a target measured too long ago or too far ahead, which is `None`: the target before counts as expired.
     pub(crate) fn require_fresh(&mut self, stamp: Option<u32>) -> Result<u32, TargetError> {
         if stamp.is_none() && self.has_target {
             self.forget_target();
