@@ -20,10 +20,9 @@ mod gear;
 mod shaft;
 
 pub use gear::{COUNTS_PER_TURN, GearRatio};
-pub(crate) use shaft::Shaft;
 pub use shaft::{Position, shortest};
+pub(crate) use shaft::{Shaft, furthest};
 
-use crate::math::limited;
 use crate::units::Angle;
 
 /// Knowledge of the absolute angle of an output shaft.
@@ -43,27 +42,11 @@ pub enum Homing {
 }
 
 impl Homing {
-    /// Tells whether the zero was known, and is in doubt.
-    pub(crate) const fn is_uncertain(self) -> bool {
-        matches!(self, Self::Uncertain)
-    }
-
     /// Returns whether an absolute angle may be commanded.
     #[must_use]
     pub const fn is_known(self) -> bool {
         matches!(self, Self::Absolute | Self::Homed)
     }
-}
-
-/// Feedback may have waited in a buffer for so long, in s.
-const WAITED_S: f32 = 0.04;
-
-/// Returns the largest way in rad of a shaft between two readings so many s apart: at this velocity in rad/s for a little longer than that,
-/// or with a speed limit toward a target as far away; beside that 8 rad/s, for a shaft that sped up and stopped meanwhile.
-pub(crate) fn furthest(gap_s: f32, velocity: f32, (to_target, speed): (f32, f32)) -> f32 {
-    let time_s = limited(gap_s, WAITED_S, f32::MAX);
-    let asked = limited(speed * time_s, 0.0, to_target);
-    8.0 * gap_s + limited(1.5 * velocity * time_s, asked, f32::MAX)
 }
 
 /// Returns the way of the rotor across lost frames in counts, counter-clockwise positive; as an error the nearest way, if another
@@ -208,17 +191,6 @@ impl Tachometer {
 mod tests {
     use super::*;
     use proptest::prelude::*;
-
-    /// By hand: 8 rad/s for the gap, beside one and a half times the velocity, or the way to the target at the speed limit, for 40 ms or more.
-    #[test]
-    fn a_shaft_turns_so_far_between_two_readings() {
-        let near = |one: f32, other: f32| assert!((one - other).abs() < 1e-6, "{one} of {other}");
-        near(furthest(0.01, 3.0, (0.0, 0.0)), 0.08 + 0.18);
-        near(furthest(0.1, 3.0, (0.0, 0.0)), 0.8 + 0.45);
-        near(furthest(0.1, 0.0, (100.0, 5.0)), 0.8 + 0.5);
-        near(furthest(0.1, 0.0, (0.2, 5.0)), 0.8 + 0.2);
-        near(furthest(0.1, 3.0, (0.2, 5.0)), 0.8 + 0.45);
-    }
 
     #[test]
     fn a_gap_at_rest_is_the_shortest_way() {

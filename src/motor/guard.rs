@@ -1,7 +1,7 @@
 //! Rules of a motor that is a device by itself, and feedback of a motor and of a joint of `snake`.
 
-use super::age;
 use super::safety::{DeviceGuard, Guarded, Hold, MotorGuard, OPENING, Rest, Turn};
+use super::{age, is_near};
 use crate::motor::{Condition, HealthConfig, Link, TargetError, Timeouts};
 use crate::time::{Duration, Instant};
 
@@ -164,7 +164,7 @@ impl Guard {
         self.motor.share(now.stamp());
         if !self.motor.latch.active().is_empty() {
             let is_alone = self.device.is_alone();
-            self.change(now, |motor| motor.end_what_is_over(is_alone));
+            self.change(now, |motor| motor.latch.end_what_is_over(motor.has_target(), is_alone));
         }
         if self.motor.latch.has(Condition::SecondMaster) {
             self.device.wake_at(now);
@@ -180,11 +180,6 @@ impl Guard {
             self.motor.relax();
         }
         turn
-    }
-
-    /// Notes a pause: the last command is not sent again.
-    pub(super) fn pause(&mut self) {
-        self.motor.pause();
     }
 
     /// Ends the rest, as the loops run, and returns its kind.
@@ -324,8 +319,19 @@ impl Default for Guard {
     }
 }
 
-/// Feedback of the motors of a device.
+/// Feedback and measurements of the motors of a device.
 impl<const N: usize> DeviceGuard<N> {
+    /// Returns the stamp of a target measured by another sensor, which expires sooner than others; `None` if measured too long ago, or too
+    /// far ahead.
+    pub(crate) fn stamp_of_measurement(&self, at: Instant) -> Option<u32> {
+        let (now, measured_us) = (self.now(), self.timeouts().measured_us());
+        // A 32-bit stamp alone would be fresh again every 71 minutes.
+        let is_fresh = !self.is_far(at) && is_near(now, at.stamp(), measured_us);
+        let stamp = at.stamp().wrapping_add(measured_us).wrapping_sub(self.timeouts().command_us());
+        // A stamp ahead has no age.
+        is_fresh.then_some(if age(now, stamp) == 0 { now } else { stamp })
+    }
+
     /// Notes feedback of a motor after a gap of any length, once the motor has taken the `consequences` of the gap.
     pub(crate) fn hear<M: Guarded>(
         &mut self,
@@ -366,11 +372,6 @@ impl Guard {
     /// Trusts feedback after a shorter gap than this, once the motor was updated.
     pub(crate) fn trust(&mut self, gap_us: u32) {
         self.device.trust(&mut self.motor, gap_us);
-    }
-
-    /// Returns the number of frames [in time](Self::hear_in_time) since the last call.
-    pub(crate) const fn take_in_time(&mut self) -> u16 {
-        self.motor.in_time.take()
     }
 
     /// Moves the time on to a tick in which no rule has to be applied and the motor may be driven; otherwise returns `false`, and moves
@@ -432,7 +433,7 @@ mod tests {
         assert!(!guard.hear_in_time(at_ms(9)));
         guard.trust(0);
         assert!(!guard.hear_in_time(at_ms(4)));
-        assert_eq!((guard.take_in_time(), guard.take_in_time()), (1, 0));
+        assert_eq!((guard.motor.in_time.take(), guard.motor.in_time.take()), (1, 0));
     }
 
     #[test]

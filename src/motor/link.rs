@@ -185,45 +185,6 @@ impl Default for Timeouts {
     }
 }
 
-/// Feedback after a shorter gap than is trusted, which needs no further check: the gap in µs, and below it the count of such feedback, in
-/// one word to load and to store.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct InTime(u32);
-
-impl InTime {
-    /// Counts up to 32 767, or 4 s of a bus full of frames of one motor. The count is taken each second. Each overflow would lengthen the gap
-    /// by 1 µs, for a minute at most: after a longer pause between two updates no age is known.
-    const COUNT_BITS: u32 = 15;
-    const COUNT: u32 = (1 << Self::COUNT_BITS) - 1;
-
-    pub(crate) const NONE: Self = Self(0);
-
-    /// Tells whether a time in µs is shorter than the trusted gap.
-    #[inline(always)]
-    pub(crate) const fn trusts(self, micros: u32) -> bool {
-        micros < self.0 >> Self::COUNT_BITS
-    }
-
-    #[inline(always)]
-    pub(crate) const fn count(&mut self) {
-        self.0 = self.0.wrapping_add(1);
-    }
-
-    /// Returns the count since the last call.
-    pub(crate) const fn take(&mut self) -> u16 {
-        let [low, high, ..] = (self.0 & Self::COUNT).to_le_bytes();
-        self.0 &= !Self::COUNT;
-        u16::from_le_bytes([low, high])
-    }
-
-    /// Sets the trusted gap.
-    pub(crate) const fn trust(&mut self, gap_us: u32) {
-        let most = u32::MAX >> Self::COUNT_BITS;
-        let gap_us = if gap_us < most { gap_us } else { most };
-        self.0 = gap_us << Self::COUNT_BITS | self.0 & Self::COUNT;
-    }
-}
-
 /// The longest time for which a motor may be driven without feedback, or without a new target.
 const BLIND_US: u32 = 1_000_000;
 

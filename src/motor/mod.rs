@@ -95,8 +95,8 @@ pub(crate) use health::{
 };
 pub use health::{Condition, Conditions, Health, HealthConfig, Reaction, Vitals};
 pub use homing::{HomingStep, StopHoming};
-pub(crate) use link::{InTime, SILENCE_US, age, is_near, take_age};
 pub use link::{Link, Timeouts};
+pub(crate) use link::{SILENCE_US, age, is_near, take_age};
 pub use load::BusLoad;
 pub use safety::OPENING;
 pub(crate) use safety::{DeviceGuard, Guarded, Hold, MotorGuard, Rest, Turn};

@@ -2,7 +2,7 @@
 
 use super::{
     Answers, Condition, Conditions, Guard, Health, HealthConfig, Latch, Link, Monitor, MotorGuard,
-    MotorName, Reaction, SILENCE_US, Timeouts, Traffic, Vitals,
+    MotorName, Reaction, SILENCE_US, TargetError, Timeouts, Traffic, Vitals, age,
 };
 use crate::time::{Duration, Edge, Instant};
 
@@ -105,7 +105,7 @@ impl Watch {
 
     /// Begins a rest: answers to commands are none to the frames of the rest.
     pub(crate) fn begin_rest(&mut self, guard: &mut Guard) {
-        self.traffic.add(guard.take_in_time());
+        self.traffic.add(guard.motor.in_time.take());
         self.answers.begin();
     }
 
@@ -161,7 +161,7 @@ impl Watch {
             return self.share;
         }
         let vitals = vitals();
-        let heard = guard.take_in_time();
+        let heard = guard.motor.in_time.take();
         self.traffic.add(heard);
         self.answers.add(heard);
         if self.traffic.end_window(&mut self.window_from, now) {
@@ -319,6 +319,19 @@ impl MotorGuard {
         let before = self.latch.active();
         self.latch.set(condition, holds && !config.ignores(condition));
         self.react(before, 1.0, config);
+    }
+
+    /// Refuses a target measured too long ago or too far ahead, which is `None`: the target before counts as expired.
+    pub(crate) fn require_fresh(&mut self, stamp: Option<u32>) -> Result<u32, TargetError> {
+        if stamp.is_none() && self.has_target() {
+            self.forget_target();
+        }
+        stamp.ok_or(TargetError::StaleMeasurement)
+    }
+
+    /// Tells whether the last feedback is at most `micros` old.
+    pub(crate) const fn was_heard_within(&self, now: u32, micros: u32) -> bool {
+        age(now, self.heard) <= micros
     }
 
     /// Trips as by a fault of the drive, which is in a state that nobody told it.

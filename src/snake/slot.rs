@@ -238,7 +238,7 @@ impl Slot {
     #[inline]
     pub(super) fn admit(&mut self, is_finite: bool, now: u32) -> Result<(), TargetError> {
         self.guard.admit(is_finite)?;
-        self.guard.require_zero((!self.homing.is_uncertain()).then_some(()))?;
+        self.guard.require_zero((self.homing != Homing::Uncertain).then_some(()))?;
         self.guard.take_target(now);
         Ok(())
     }

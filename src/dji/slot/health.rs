@@ -111,7 +111,7 @@ pub(in crate::dji) fn check(slot: &mut Slot, seen: &Surroundings) {
         close_window(slot, window, seen.feedback_hz);
     }
     if !before.is_empty() {
-        slot.guard.end_what_is_over(seen.is_alone);
+        slot.guard.latch.end_what_is_over(slot.guard.has_target(), seen.is_alone);
     }
     let mut left = 1.0;
     if slot.guard.link() == Link::Online {

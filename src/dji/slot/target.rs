@@ -44,7 +44,7 @@ impl Slot {
     ) -> Result<(), TargetError> {
         needs(self.has_position_loop())?;
         self.admit(position.is_finite())?;
-        let position = self.require_zero(position, !self.homing.is_uncertain())?;
+        let position = self.require_zero(position, self.homing != Homing::Uncertain)?;
         let (turns, phase) = self.shaft.locate(self.inside(position));
         let goal = Goal { turns: self.shaft.near(turns), value: phase };
         self.start(Action::Position, goal, now);

@@ -67,7 +67,7 @@ impl<M: DriveProtocol> Actuator<M> {
             Some(turns) if turns.as_radians() != 0.0 => {
                 self.target = self.target.moved(turns);
                 self.start.turn(turns);
-                self.guard.pause();
+                self.guard.motor.pause();
                 self.is_steady = false;
             }
             Some(_) => {}

@@ -44,6 +44,18 @@ impl Latch {
         }
     }
 
+    /// Ends the conditions that an update with a step ends: an expired target if there is a new one, and a second master if no other node commands
+    /// the device.
+    pub(crate) const fn end_what_is_over(&mut self, has_target: bool, is_alone: bool) {
+        if has_target {
+            self.set(Condition::CommandLost, false);
+        }
+        self.set(Condition::ClockFault, false);
+        if is_alone {
+            self.set(Condition::SecondMaster, false);
+        }
+    }
+
     /// Sets the error reported by an ESC. Another code of the same severity begins the condition again.
     pub(crate) fn report(&mut self, error: Option<Severity>, changed: bool, config: &HealthConfig) {
         for (condition, severity) in

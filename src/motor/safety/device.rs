@@ -2,7 +2,7 @@
 
 use super::motor::{Guarded, MotorGuard};
 use super::{Hold, LONGEST_PAUSE_US, RIVAL_US};
-use crate::motor::{Journal, Link, Timeouts, age, is_near};
+use crate::motor::{Journal, Link, Timeouts, is_near};
 use crate::time::{Duration, Instant};
 
 const LONGEST_PAUSE: Duration = Duration::from_micros(LONGEST_PAUSE_US as u64);
@@ -52,17 +52,6 @@ impl<const N: usize> DeviceGuard<N> {
 
     pub(crate) const fn timeouts(&self) -> &Timeouts {
         &self.timeouts
-    }
-
-    /// Returns the stamp of a target measured by another sensor, which expires sooner than others; `None` if measured too long ago, or too
-    /// far ahead.
-    pub(crate) fn stamp_of_measurement(&self, at: Instant) -> Option<u32> {
-        let (now, measured_us) = (self.now, self.timeouts.measured_us());
-        // A 32-bit stamp alone would be fresh again every 71 minutes.
-        let is_fresh = !self.is_far(at) && is_near(now, at.stamp(), measured_us);
-        let stamp = at.stamp().wrapping_add(measured_us).wrapping_sub(self.timeouts.command_us());
-        // A stamp ahead has no age.
-        is_fresh.then_some(if age(now, stamp) == 0 { now } else { stamp })
     }
 
     /// Returns the stamp of new targets.

@@ -2,8 +2,46 @@
 
 use super::{Arming, Hold, LONGEST_PAUSE_US, Rest, Turn};
 use crate::math::limited;
-use crate::motor::{Condition, InTime, Latch, Latched, Link, TargetError, Timeouts, age, is_near};
+use crate::motor::{Condition, Latch, Latched, Link, TargetError, Timeouts, age, is_near};
 use crate::time::Duration;
+
+/// Feedback after a shorter gap than is trusted, which needs no further check: the gap in µs, and below it the count of such feedback, in
+/// one word to load and to store.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct InTime(u32);
+
+impl InTime {
+    /// Counts up to 32 767, or 4 s of a bus full of frames of one motor, and is taken each second. An overflow lengthens the gap by 1 µs.
+    const COUNT_BITS: u32 = 15;
+    const COUNT: u32 = (1 << Self::COUNT_BITS) - 1;
+
+    pub(crate) const NONE: Self = Self(0);
+
+    /// Tells whether a time in µs is shorter than the trusted gap.
+    #[inline(always)]
+    pub(crate) const fn trusts(self, micros: u32) -> bool {
+        micros < self.0 >> Self::COUNT_BITS
+    }
+
+    #[inline(always)]
+    pub(crate) const fn count(&mut self) {
+        self.0 = self.0.wrapping_add(1);
+    }
+
+    /// Returns the count since the last call.
+    pub(crate) const fn take(&mut self) -> u16 {
+        let [low, high, ..] = (self.0 & Self::COUNT).to_le_bytes();
+        self.0 &= !Self::COUNT;
+        u16::from_le_bytes([low, high])
+    }
+
+    /// Sets the trusted gap.
+    pub(crate) const fn trust(&mut self, gap_us: u32) {
+        let most = u32::MAX >> Self::COUNT_BITS;
+        let gap_us = if gap_us < most { gap_us } else { most };
+        self.0 = gap_us << Self::COUNT_BITS | self.0 & Self::COUNT;
+    }
+}
 
 /// Decides whether one motor may be driven. See the [module](super) for its states.
 #[derive(Debug, Clone, Copy)]
@@ -93,11 +131,6 @@ impl MotorGuard {
 
     pub(crate) const fn link(&self) -> Link {
         self.link
-    }
-
-    /// Tells whether the last feedback is at most `micros` old.
-    pub(crate) const fn was_heard_within(&self, now: u32, micros: u32) -> bool {
-        age(now, self.heard) <= micros
     }
 
     pub(crate) const fn is_armed(&self) -> bool {
@@ -225,7 +258,7 @@ impl MotorGuard {
     }
 
     /// Discards an expired target.
-    fn forget_target(&mut self) {
+    pub(in crate::motor) fn forget_target(&mut self) {
         self.relax();
         self.latch.set(Condition::CommandLost, true);
         self.forgotten_targets = self.forgotten_targets.saturating_add(1);
@@ -240,17 +273,6 @@ impl MotorGuard {
             self.lose();
         } else if self.has_target && is_bygone(self.commanded) {
             self.forget_target();
-        }
-    }
-
-    /// Ends the conditions that an update with a step ends; a second master if no other node [commands](super::DeviceGuard::is_alone) the device.
-    pub(crate) const fn end_what_is_over(&mut self, is_alone: bool) {
-        if self.has_target {
-            self.latch.set(Condition::CommandLost, false);
-        }
-        self.latch.set(Condition::ClockFault, false);
-        if is_alone {
-            self.latch.set(Condition::SecondMaster, false);
         }
     }
 
@@ -289,14 +311,6 @@ impl MotorGuard {
             self.relax();
         }
         target.ok_or(TargetError::NotHomed)
-    }
-
-    /// Refuses a target measured too long ago or too far ahead, which is `None`: the target before counts as expired.
-    pub(crate) fn require_fresh(&mut self, stamp: Option<u32>) -> Result<u32, TargetError> {
-        if stamp.is_none() && self.has_target {
-            self.forget_target();
-        }
-        stamp.ok_or(TargetError::StaleMeasurement)
     }
 
     /// Tells whether a target may replace an earlier one: a motor with a target is armed.

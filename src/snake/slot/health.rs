@@ -45,7 +45,6 @@ impl Slot {
         let gap_us = now.since(self.heard).micros_u32().unwrap_or(u32::MAX);
         let link = self.guard.link();
         let was_heard = !matches!(link, Link::Unheard | Link::Offline);
-        let is_silence = self.guard.is_silence(gap_us, rules.timeouts());
         let is_further = |before| way(before, raw) > furthest(self, before, gap_us as f32 * 1e-6);
         if was_heard && self.raw.is_some_and(is_further) {
             self.position_jumps = self.position_jumps.saturating_add(1);
@@ -61,8 +60,9 @@ impl Slot {
                 None => self.window_from = now,
             }
             self.traffic.count();
+            let timeouts = *rules.timeouts();
             rules.hear(self, self.place(), now, |slot| {
-                if is_silence {
+                if slot.guard.is_silence(gap_us, &timeouts) {
                     slot.lose_zero();
                 }
             });
@@ -168,13 +168,16 @@ fn measure_rate(slot: &mut Slot, raw: i32, now: Instant) {
 
 /// Begins and ends conditions, and ends the window in which positions are counted.
 fn check(slot: &mut Slot, is_stalled: bool, is_alone: Option<bool>, now: Instant) {
-    if let Some(is_alone) = is_alone {
-        slot.guard.end_what_is_over(is_alone);
+    let is_lost = slot.guard.link() == Link::Offline;
+    if is_stalled || is_lost || !slot.guard.latch.active().is_empty() {
+        if let Some(is_alone) = is_alone {
+            slot.guard.latch.end_what_is_over(slot.guard.has_target(), is_alone);
+        }
+        if is_lost {
+            slot.lose_zero();
+        }
+        slot.guard.judge(Condition::Stalled, is_stalled, slot.stall.health());
     }
-    if slot.guard.link() == Link::Offline {
-        slot.lose_zero();
-    }
-    slot.guard.judge(Condition::Stalled, is_stalled, slot.stall.health());
     if slot.driven && slot.is_forgotten(now) {
         slot.renew(Register::Position);
     }
