@@ -13,59 +13,61 @@ use embedded_can::{Frame, StandardId};
 mod custom_motor;
 use custom_motor::MyMotor;
 
-/// The motor of the example, which stands: its current after so many ms of a target, the last with targets that come before it.
-fn amperes_of_blocked(millis: u64, before_last: &[f32]) -> f32 {
-    let mut motor = Actuator::new(MyMotor::new(3).unwrap());
-    let (feedback, mut amperes) = (CanFrame::of(StandardId::new(0x143).unwrap(), [0, 0, 31]), 0.0);
-    for ms in 1..=millis {
-        let now = Instant::from_micros(1_000 * ms);
-        assert_eq!(motor.ingest(&feedback, now), Ingest::Taken);
-        if ms == 1 {
-            motor.arm(now).unwrap();
-        }
-        for rpm in before_last.iter().filter(|_| ms == millis) {
-            assert!(motor.set_velocity((), AngularVelocity::from_rpm(*rpm)).is_err());
-        }
-        motor.set_velocity((), AngularVelocity::from_rpm(20.0)).unwrap();
-        motor.update(Tick::new(now, 0.001));
-        while let Some(frame) = motor.next_frame(0) {
-            let [a, b, c, d] = *frame.data() else { panic!("{frame:?}") };
-            amperes = f32::from_le_bytes([a, b, c, d]);
-        }
-    }
-    amperes
+/// The motor of the example under a simulated clock.
+struct Bench {
+    motor: Actuator<MyMotor>,
+    ms: u64,
+    amperes: f32,
 }
 
-/// A refused target takes the one before away, also where a good one comes in the same cycle: the loop starts afresh, from zero.
+impl Bench {
+    fn new() -> Self {
+        Self { motor: Actuator::new(MyMotor::new(3).unwrap()), ms: 0, amperes: 0.0 }
+    }
+
+    /// A millisecond with feedback of the rotor, refused targets in rpm, and a good one as the last: the command is kept.
+    fn step(&mut self, rotor_rpm: i16, targets_rpm: &[f32]) {
+        self.ms += 1;
+        let now = Instant::from_micros(1_000 * self.ms);
+        let [low, high] = rotor_rpm.to_le_bytes();
+        let feedback = CanFrame::of(StandardId::new(0x143).unwrap(), [low, high, 31]);
+        assert_eq!(self.motor.ingest(&feedback, now), Ingest::Taken);
+        if self.ms == 1 {
+            self.motor.arm(now).unwrap();
+        }
+        let mut set = |rpm: &f32| self.motor.set_velocity((), AngularVelocity::from_rpm(*rpm));
+        let (good, refused) = targets_rpm.split_last().unwrap();
+        assert!(refused.iter().all(|rpm| set(rpm).is_err()));
+        set(good).unwrap();
+        self.motor.update(Tick::new(now, 0.001));
+        while let Some(frame) = self.motor.next_frame(0) {
+            let [a, b, c, d] = *frame.data() else { panic!("{frame:?}") };
+            self.amperes = f32::from_le_bytes([a, b, c, d]);
+        }
+    }
+}
+
+/// A refused target takes the one before away, also where a good one comes in the same cycle: the loop of a blocked motor starts afresh, from zero.
 #[test]
 fn a_good_target_behind_a_refused_one_starts_afresh() {
-    let (whole, afresh) = (amperes_of_blocked(500, &[]), amperes_of_blocked(500, &[f32::NAN]));
+    let mut bench = Bench::new();
+    (0..500).for_each(|_| bench.step(0, &[20.0]));
+    let whole = bench.amperes;
+    bench.step(0, &[f32::NAN, 20.0]);
+    let afresh = bench.amperes;
     assert!(whole > 1.0 && afresh.abs() < 0.05 * whole, "{afresh} A after {whole} A");
 }
 
 /// As in the example: 0.2 Nm for each ampere, 0.004 kg m² and friction at the output, a gear of 27.
 fn fastest_rpm(target_rpm: f32) -> f32 {
-    let mut motor = Actuator::new(MyMotor::new(3).unwrap());
-    let target = AngularVelocity::from_rpm(target_rpm);
-    let (mut amperes, mut rad_per_s, mut fastest) = (0.0_f32, 0.0_f32, 0.0_f32);
-    for ms in 1..=1_000 {
-        let now = Instant::from_micros(1_000 * ms);
-        rad_per_s += (0.2 * amperes - 0.01 * rad_per_s) / 0.004 * 0.001;
+    let mut bench = Bench::new();
+    let (mut rad_per_s, mut fastest) = (0.0_f32, 0.0_f32);
+    for _ in 0..1_000 {
+        rad_per_s += (0.2 * bench.amperes - 0.01 * rad_per_s) / 0.004 * 0.001;
         let rpm = AngularVelocity::from_rad_per_s(rad_per_s).as_rpm();
         fastest = if rpm.abs() > fastest.abs() { rpm } else { fastest };
         #[expect(clippy::cast_possible_truncation, reason = "saturates")]
-        let [low, high] = ((rpm * 27.0) as i16).to_le_bytes();
-        let feedback = CanFrame::of(StandardId::new(0x143).unwrap(), [low, high, 31]);
-        assert_eq!(motor.ingest(&feedback, now), Ingest::Taken);
-        if ms == 1 {
-            motor.arm(now).unwrap();
-        }
-        motor.set_velocity((), target).unwrap();
-        motor.update(Tick::new(now, 0.001));
-        while let Some(frame) = motor.next_frame(0) {
-            let [a, b, c, d] = *frame.data() else { panic!("{frame:?}") };
-            amperes = f32::from_le_bytes([a, b, c, d]);
-        }
+        bench.step((rpm * 27.0) as i16, &[target_rpm]);
     }
     fastest
 }

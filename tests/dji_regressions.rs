@@ -293,6 +293,13 @@ fn an_old_command_is_not_repeated_by_a_late_step_without_length() {
         bus.update(Tick::new(us(2_000 + pause), 0.0));
         assert_eq!(sent(&mut bus).last(), Some(&(0x200, [word, 0, 0, 0])), "{pause}");
     }
+
+    // Nor by one in which the feedback is late.
+    let (mut bus, motor) = armed(at_once(1));
+    bus.set_raw(motor, 100).unwrap();
+    step(&mut bus, 2_000);
+    bus.update(Tick::new(us(12_000), 0.0));
+    assert_eq!(sent(&mut bus).last(), Some(&(0x200, [0; 4])));
 }
 
 #[test]

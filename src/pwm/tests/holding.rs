@@ -1,4 +1,4 @@
-//! What an update without a time step holds.
+//! Updates without a time step: the output that a motor keeps, and the loop that goes on from that output.
 
 use super::*;
 
@@ -16,7 +16,7 @@ fn integrator(log: &Log) -> Motor<'_> {
     motor
 }
 
-/// What is held for an update without a step is the output of the target in force, not one from before a rest.
+/// An update without a step keeps the output of the present target, and no output from before a rest.
 #[test]
 fn an_update_without_a_step_holds_no_duty_from_before_a_rest() {
     let resting: [Work; 3] = [
@@ -83,7 +83,7 @@ fn a_speed_loop_does_not_take_over_a_duty_that_never_was() {
     assert_eq!(last(&log), 10_000);
 }
 
-/// Nor from a loop that a direct duty replaced since, or one that was to take over when a rest came.
+/// A speed loop starts afresh if a direct duty replaced the loop meanwhile, or if a rest came before the loop took over.
 #[test]
 fn a_speed_loop_does_not_go_on_from_before_a_duty_or_a_rest() {
     let velocity: Work = |motor| motor.set_velocity((), AngularVelocity::ZERO).unwrap();
