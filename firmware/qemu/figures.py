@@ -158,9 +158,8 @@ def compare(title, column, budget, found, closed_loop):
         if name not in budget and not name.startswith(("constant_", "ram_")):
             wrong.append(f"{name} has no budget")
     for name, (least, most) in found["spread"].items():
-        # Means of 1000 calls, rounded: a keep-alive more or less among them, by the phase of its timer, may show as 1. Whether a joint's
-        # position is awaited goes by the turns of all.
-        if most - least > (6 if name == "constant_decode_joint" else 1):
+        # Means of 1000 calls, rounded: a keep-alive more or less among them, by the phase of its timer, may show as 1.
+        if most - least > 1:
             wrong.append(f"{name} is not constant: {least} to {most}")
     if found.get("closed_loop", closed_loop) != closed_loop:
         wrong.append(f"the closed loop gives {found['closed_loop']}, on the host {closed_loop}")
