@@ -6,7 +6,7 @@ use super::outbox::{Outbox, Place};
 use super::slot::config::configured;
 use super::slot::{Key, Slot, health};
 use super::{AttachError, Facts};
-use crate::motor::{ArmError, BusLoad, Claim, Condition, MotorName, Obstacles};
+use crate::motor::{ArmError, BusLoad, Claim, Condition, MotorName, Obstacles, are_armed};
 use crate::time::Instant;
 use embedded_can::StandardId;
 
@@ -139,8 +139,8 @@ pub(super) fn engage<const N: usize>(
 
 /// Tells whether there are motors, and all take targets.
 pub(super) fn is_armed(slots: &[Slot]) -> bool {
-    let mut attached = slots.iter().filter(|slot| slot.facts().is_some()).peekable();
-    attached.peek().is_some() && attached.all(|slot| slot.guard.is_armed())
+    let attached = slots.iter().filter(|slot| slot.facts().is_some());
+    are_armed(attached.map(|slot| &slot.guard))
 }
 
 /// Returns a command of one of these motors that another node has sent.

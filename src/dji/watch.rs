@@ -10,7 +10,7 @@ use super::slot::health::CheckRound;
 use super::slot::{Slot, Surroundings, gap, health};
 use super::{CommandFrame, Feedback};
 use crate::frame::CanFrame;
-use crate::motor::{Condition, Hold, Ingest, MotorName, Turn};
+use crate::motor::{Condition, Hold, Ingest, MotorName, Output};
 use crate::time::{Edge, Instant};
 
 /// Takes any frame.
@@ -122,7 +122,7 @@ fn finish<const N: usize>(motors: &mut Motors<N>, outbox: &mut Outbox, hold: Hol
     if hold != Hold::Keep {
         outbox.clear();
     }
-    let repeats = |slot: &Slot| slot.guard.turn(Some(hold)) == Turn::Repeat;
+    let repeats = |slot: &Slot| slot.guard.output(Some(hold)) == Output::Repeat;
     for slot in motors.slots.iter().filter(|slot| !repeats(slot)) {
         outbox.put(slot.place, 0);
     }
@@ -181,9 +181,7 @@ pub(super) fn take_edge<const N: usize>(
     motors: &mut Motors<N>,
 ) -> Option<Edge<Condition, MotorName>> {
     let (guard, slots) = motors.parts();
-    let Edge { source, condition, began, at } = guard.journal.next_edge(slots, guard.updated())?;
-    let source = slots.get(usize::from(source))?.name()?;
-    Some(Edge { source, condition, began, at })
+    guard.journal.next_edge(slots, guard.updated(), Slot::name)
 }
 
 /// Counters of a bus. All saturate, except `packed` and `superseded`, which wrap at 2^32.

@@ -2,7 +2,7 @@
 
 #[cfg(feature = "hal")]
 use super::Guard;
-use super::{BusLoad, Claim, Condition, Conditions, MotorName};
+use super::{BusLoad, Claim, Condition, Conditions, MotorGuard, MotorName};
 
 /// The motors that prevent arming, by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -258,6 +258,12 @@ impl Obstacles {
         }
         if granted { Ok(()) } else { Err(ArmError::NotReleased) }
     }
+}
+
+/// Tells whether there are motors, and all take targets.
+pub(crate) fn are_armed<'a>(motors: impl Iterator<Item = &'a MotorGuard>) -> bool {
+    let mut motors = motors.peekable();
+    motors.peek().is_some() && motors.all(MotorGuard::is_armed)
 }
 
 /// A setting of a drive that prevents arming: the setting differs from the expected value, or is not known.

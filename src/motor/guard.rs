@@ -1,8 +1,8 @@
 //! Rules of a motor that is a device by itself, and feedback of a motor and of a joint of `snake`.
 
-use super::safety::{DeviceGuard, Guarded, Hold, MotorGuard, OPENING, Rest, Turn};
+use super::safety::{DeviceGuard, Guarded, Hold, MotorGuard, OPENING, Output, Rest};
 use super::{age, is_near};
-use crate::motor::{Condition, HealthConfig, Link, TargetError, Timeouts};
+use crate::motor::{Condition, Link, TargetError, Timeouts};
 use crate::time::{Duration, Instant};
 
 /// Decides whether one motor of your own may be driven, by the rules of all motors of this crate:
@@ -98,9 +98,9 @@ impl Guard {
     }
 
     /// Notes a command of the motor by another node.
-    pub(crate) fn hear_rival(&mut self, now: Instant, config: &HealthConfig) {
+    pub(super) fn hear_rival(&mut self, now: Instant, change: impl FnOnce(&mut MotorGuard)) {
         self.device.hear_rival(now.stamp());
-        self.change(now, |motor| motor.judge(Condition::SecondMaster, true, config));
+        self.change(now, change);
         self.device.wake_at(self.device.updated());
     }
 
@@ -174,12 +174,12 @@ impl Guard {
 
     /// Tells what the tick does, after [`pass`](Self::pass) and the health; at rest without a target, the loops will start afresh.
     #[inline]
-    pub(crate) fn turn(&mut self, held: Option<Hold>) -> Turn {
-        let turn = self.motor.turn(held);
-        if turn == Turn::Rest && !self.motor.has_target() {
+    pub(crate) fn output(&mut self, held: Option<Hold>) -> Output {
+        let output = self.motor.output(held);
+        if output == Output::Rest && !self.motor.has_target() {
             self.motor.relax();
         }
-        turn
+        output
     }
 
     /// Ends the rest, as the loops run, and returns its kind.

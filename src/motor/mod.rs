@@ -48,14 +48,13 @@
 //! | arming | a granted request to arm | offline | a fault, lost time, a lost zero | disarm, emergency stop |
 //! |---|---|---|---|---|
 //! | disarmed | armed | | | |
-//! | armed | | latched | tripped | disarmed |
+//! | armed | | latched | tripped; with a lost zero, a geared motor of `dji` stays armed and refuses positions | disarmed |
 //! | latched | armed | | tripped | disarmed |
 //! | tripped | armed | | | disarmed |
 //!
 //! A latched and a tripped motor differ in one thing: if [`with_resume`](crate::dji::Config::with_resume) is configured, a latched motor
 //! takes targets again by itself when online. Each latch, each trip, and the emergency stop when set and when cleared, begin the pause of the gesture: a
-//! request to arm is granted after 100 ms without a request. Disarming begins no pause. A geared motor of `dji` that lost its zero does not trip: it
-//! refuses positions.
+//! request to arm is granted after 100 ms without a request. Disarming begins no pause.
 
 mod actuator;
 mod arming;
@@ -79,8 +78,8 @@ pub(crate) use actuator::{
     TorqueLoops, code_from, ingest_eight, inside, lowest_bit, mit_model, models,
     register_questions, registers,
 };
-pub(crate) use arming::Obstacles;
 pub use arming::{ArmError, Missing, WrongSetting};
+pub(crate) use arming::{Obstacles, are_armed};
 pub use capability::{Capabilities, Capability};
 pub(crate) use claim::Route;
 pub use claim::{Claim, MotorName};
@@ -99,6 +98,6 @@ pub use link::{Link, Timeouts};
 pub(crate) use link::{SILENCE_US, age, is_near, take_age};
 pub use load::BusLoad;
 pub use safety::OPENING;
-pub(crate) use safety::{DeviceGuard, Guarded, Hold, MotorGuard, Rest, Turn};
+pub(crate) use safety::{DeviceGuard, Guarded, Hold, MotorGuard, Output, Rest};
 pub use switch::{ArmingSwitch, SwitchOrder};
 pub(crate) use watch::Watch;

@@ -1,19 +1,13 @@
-//! Health of one motor outside of a bus: its checks and conditions; and what a condition does to any motor.
+//! Checks and conditions of one motor outside of a bus, and the consequences of a condition for any motor.
 
 use super::{
     Answers, Condition, Conditions, Guard, Health, HealthConfig, Latch, Link, Monitor, MotorGuard,
-    MotorName, Reaction, SILENCE_US, TargetError, Timeouts, Traffic, Vitals, age,
+    MotorName, SILENCE_US, TargetError, Timeouts, Traffic, Vitals, age,
 };
 use crate::time::{Duration, Edge, Instant};
 
 /// The checks of a motor without a configuration of its own.
 static USUAL: HealthConfig = HealthConfig::new();
-
-/// The conditions that a program notes have no consequence but an edge.
-static NO_REACTION: HealthConfig = HealthConfig::new()
-    .with_reaction(Condition::Fault, Reaction::Report)
-    .with_reaction(Condition::DuplicateId, Reaction::Report)
-    .with_reaction(Condition::Runaway, Reaction::Report);
 
 /// Period of the checks of slow quantities in µs: temperature, effort, speed. A power of two.
 const PERIOD_US: u64 = 8_192;
@@ -117,13 +111,14 @@ impl Watch {
     /// Notes a command of another node, which relaxes the motor where a second master demands rest. The drive answers that node too.
     pub(crate) fn hear_rival(&mut self, guard: &mut Guard, now: Instant) {
         self.answers = Answers::BESIDE_RIVAL;
-        guard.hear_rival(now, self.config);
+        guard.hear_rival(now, |motor| motor.judge(Condition::SecondMaster, true, self.config));
     }
 
-    /// Trips the motor as by a fault that the drive reports in one update.
+    /// Trips the motor as by a fault that the drive reports in one update; of old feedback, without a fault.
     pub(crate) fn fail(&mut self, guard: &mut Guard, error_code: u8, now: Instant) {
         self.error_code = error_code;
-        guard.change(now, |motor| motor.fail(self.config));
+        let is_online = guard.link() == Link::Online;
+        guard.change(now, |motor| if is_online { motor.fail(self.config) } else { motor.trip() });
     }
 
     /// Tells whether the motor must not be armed.
@@ -264,7 +259,7 @@ impl Guard {
     /// update more than a second after the last.
     pub fn note(&mut self, condition: Condition, holds: bool, now: Instant) {
         if condition == Condition::SecondMaster && holds {
-            return self.hear_rival(now, &NO_REACTION);
+            return self.hear_rival(now, |motor| motor.latch.set(condition, holds));
         }
         self.change_conditions(now, |latch| latch.set(condition, holds));
     }
@@ -302,8 +297,7 @@ impl Guard {
     /// ```
     pub fn next_edge(&mut self, motor: MotorName) -> Option<Edge<Condition, MotorName>> {
         let (motors, now) = (core::slice::from_mut(&mut self.motor), self.device.updated());
-        let Edge { condition, began, at, .. } = self.device.journal.next_edge(motors, now)?;
-        Some(Edge { source: motor, condition, began, at })
+        self.device.journal.next_edge(motors, now, |_| Some(motor))
     }
 
     /// Returns the part of a motor's health that the guard holds.
@@ -312,7 +306,7 @@ impl Guard {
     }
 }
 
-/// Consequences of the conditions of a motor.
+/// Age of feedback, consequences of conditions, and what the health of a motor has of them.
 impl MotorGuard {
     /// Sets whether a condition holds that is not ignored, and takes its consequences.
     pub(crate) fn judge(&mut self, condition: Condition, holds: bool, config: &HealthConfig) {
@@ -385,6 +379,16 @@ impl MotorGuard {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn feedback_counts_as_heard_for_as_long_as_is_asked() {
+        let heard = u32::MAX - 5_000; // before the wrap
+        let mut motor = MotorGuard::NEW;
+        motor.heard = heard;
+        let ages = [0, 12_288, 12_289].map(|age| heard.wrapping_add(age));
+        assert_eq!(ages.map(|now| motor.was_heard_within(now, 12_288)), [true, true, false]);
+        assert!(motor.was_heard_within(heard.wrapping_sub(1), 0), "stamped ahead");
+    }
 
     #[test]
     fn a_second_master_counts_for_a_second_on_both_sides_of_its_last_command() {

@@ -7,7 +7,7 @@ use crate::error::ConfigError;
 use crate::math::limited;
 use crate::motor::{
     ArmError, Capabilities, Capability, Condition, Conditions, Guard, Health, Link, MotorName,
-    Obstacles, OneOf, Rest, TargetError, Turn, VelocityDrive, Vitals, Watch,
+    Obstacles, OneOf, Output, Rest, TargetError, VelocityDrive, Vitals, Watch,
 };
 use crate::time::{Edge, Instant, Tick, TimeStep};
 use crate::units::AngularVelocity;
@@ -187,10 +187,10 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
         let step = TimeStep::of_motor(tick.dt_s());
         let held = self.guard.pass(tick.now(), !step.is_hold());
         let left = self.check(tick.now());
-        let asked = match self.guard.turn(held) {
-            Turn::Drive => self.drive(step),
-            Turn::Repeat => self.output,
-            Turn::Rest => 0.0,
+        let asked = match self.guard.output(held) {
+            Output::Drive => self.drive(step),
+            Output::Repeat => self.output,
+            Output::Rest => 0.0,
         };
         let (lower, upper) = self.guard.range(left);
         let (lower, upper) = (lower * self.config.limit, upper * self.config.limit);

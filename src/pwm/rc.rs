@@ -2,7 +2,7 @@ use crate::error::ConfigError;
 use crate::math::limited;
 use crate::motor::{
     ArmError, Capabilities, Capability, Condition, Conditions, Guard, Health, Hold, MotorName,
-    OPENING, Obstacles, TargetError, Timeouts, Turn, VelocityDrive,
+    OPENING, Obstacles, Output, TargetError, Timeouts, VelocityDrive,
 };
 use crate::time::{Duration, Edge, Instant, Tick, TimeStep};
 use crate::units::AngularVelocity;
@@ -221,15 +221,15 @@ impl<P: SetDutyCycle> RcPwm<P> {
         if self.arming != Arming::Idle {
             return self.go_on_arming(tick.now());
         }
-        match self.guard.turn(held) {
-            Turn::Drive => {
+        match self.guard.output(held) {
+            Output::Drive => {
                 self.guard.end_rest();
                 self.pulse_us = self.pulse_of_target();
                 self.send(self.pulse_us)
             }
-            Turn::Repeat => self.send(self.pulse_us),
-            Turn::Rest if self.off_at_rest => self.channel.set_duty_cycle_fully_off(),
-            Turn::Rest => self.send(self.neutral_us().into()),
+            Output::Repeat => self.send(self.pulse_us),
+            Output::Rest if self.off_at_rest => self.channel.set_duty_cycle_fully_off(),
+            Output::Rest => self.send(self.neutral_us().into()),
         }
     }
 

@@ -128,13 +128,12 @@ impl Joints {
 
     /// Takes a frame received at `now`. Runs in constant time.
     ///
-    /// Costs 231 instructions on a Cortex-M4F (`docs/figures.md`).
+    /// Costs 222 instructions on a Cortex-M4F (`docs/figures.md`).
     pub fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
         let index = frame.header().wrapping_sub(1) as usize;
         let reply = Register::from_reply(frame.data());
-        let is_attached = self.slots.get(index).is_some_and(|slot| slot.id.is_some());
-        if reply.is_some() && is_attached && !self.guard.is_running() {
-            self.guard.pass_unwatched(&mut self.slots, now);
+        if reply.is_some() && !self.guard.is_running() {
+            self.pass_unwatched(index, now);
         }
         let Some(slot) = self.slots.get_mut(index) else { return Ingest::Unrelated };
         let (counters, rules) = (&mut self.counters, &mut self.guard);
@@ -175,20 +174,28 @@ impl Joints {
         }
     }
 
+    /// Notes the time of a reply before the first update.
+    #[cold]
+    #[inline(never)]
+    fn pass_unwatched(&mut self, index: usize, now: Instant) {
+        if self.slots.get(index).is_some_and(|slot| slot.id.is_some()) {
+            self.guard.pass_unwatched(&mut self.slots, now);
+        }
+    }
+
     /// Chooses the joints for requests and writes, and relaxes joints that may not be driven.
     ///
     /// An update before the arming, or not after the previous one, relaxes every joint until armed again. A `dt_s` of zero, below zero, infinite or
     /// NaN chooses no joint for one update; a second such update in a row, or a late one, disables all joints until the next usable step.
     /// Frames that disable a joint are sent nevertheless.
     ///
-    /// Costs 2940 instructions on a Cortex-M4F, for 12 joints, with the frames out and an answer in (`docs/figures.md`).
+    /// Costs 2922 instructions on a Cortex-M4F, for 12 joints, with the frames out and an answer in (`docs/figures.md`).
     pub fn update(&mut self, tick: Tick) {
         let before = self.guard.begin(tick.now());
         let has_step = !TimeStep::new(tick.dt_s(), ANY_STEP_S).is_hold();
         let is_quiet = has_step && self.guard.is_quiet(before, tick.now());
         if !is_quiet {
-            let held = self.guard.pass(&mut self.slots, before, has_step, u32::MAX);
-            if let Some(hold) = held {
+            if let Some(hold) = self.guard.pass(&mut self.slots, before, has_step, u32::MAX) {
                 return self.hold(hold);
             }
         }
@@ -228,8 +235,7 @@ impl Joints {
         self.now = self.now.max(now);
         // A clock that stands or was set back does not show when a reply is overdue: an update then counts for a millisecond.
         let held = Duration::from_millis(self.guard.held_steps().into());
-        let is_long = held > self.reply_timeout;
-        self.give_up((!(stands && is_long)).then_some(self.reply_timeout));
+        self.give_up((!(stands && held > self.reply_timeout)).then_some(self.reply_timeout));
         self.update_joints(false, Some(hold));
         schedule::stop_again(self);
     }

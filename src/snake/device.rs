@@ -5,6 +5,7 @@ use super::{Joints, schedule};
 use crate::frame::CanFrame;
 use crate::motor::{
     CanDevice, Claim, Condition, Conditions, Devices, Ingest, MotorName, Visitor, WrongSetting,
+    are_armed,
 };
 use crate::time::{Edge, Instant, Tick};
 use embedded_can::StandardId;
@@ -88,8 +89,8 @@ impl CanDevice for Joints {
     }
 
     fn is_armed(&self) -> bool {
-        let mut attached = self.slots.iter().filter(|slot| slot.id.is_some()).peekable();
-        attached.peek().is_some() && attached.all(|slot| slot.guard.is_armed())
+        let attached = self.slots.iter().filter(|slot| slot.id.is_some());
+        are_armed(attached.map(|slot| &slot.guard))
     }
 
     fn emergency_stop(&mut self) {

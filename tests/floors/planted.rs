@@ -15,7 +15,7 @@ fn found_with(file: &str, lines: &str) -> Vec<String> {
 }
 
 /// File, and a rule.
-const RULES: [(&str, &str); 48] = [
+const RULES: [(&str, &str); 49] = [
     // A motor trips by a flag.
     (
         "motor/actuator/update.rs",
@@ -112,6 +112,10 @@ const RULES: [(&str, &str); 48] = [
     (
         "pwm/rc.rs",
         "impl RcPwm { fn f(&mut self, is_wrong: bool, now: Instant) { if is_wrong { self.guard.fail(now, &USUAL) } } }",
+    ),
+    (
+        "pwm/rc.rs",
+        "fn f(tick: Tick, pulse_us: f32) -> f32 { if TimeStep::of(tick.dt_s()).is_hold() { pulse_us } else { 0.0 } }",
     ),
     // Time in steps, and updates that are counted.
     (
@@ -216,11 +220,11 @@ const OTHERS: [(&str, &str); 10] = [
     ),
     (
         "dji/watch.rs",
-        "fn f(slot: &mut Slot, hold: Hold) -> bool { slot.guard.turn(Some(hold)) == Turn::Repeat }",
+        "fn f(slot: &mut Slot, hold: Hold) -> bool { slot.guard.output(Some(hold)) == Output::Repeat }",
     ),
     (
         "snake/bus.rs",
-        "fn f(slot: &mut Slot, now: Instant) -> bool { slot.guard.drives(now) && slot.speed > 0 }",
+        "fn f(slot: &mut Slot, now: Instant) -> bool { slot.guard.drives() && slot.speed > 0 }",
     ),
     (
         "pwm/brushed.rs",

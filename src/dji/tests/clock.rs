@@ -60,8 +60,7 @@ fn a_clock_that_wraps_early_or_swings_drives_no_longer_than_the_deadline() {
 /// The task of a button may read the clock before the tick does.
 #[test]
 fn an_arming_at_an_earlier_time_makes_no_target_younger() {
-    let mut bus = Bus::new();
-    let wheel = bus.attach(Config::<M3508>::at_once(1)).unwrap();
+    let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1)]);
     assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(10)), Ingest::Taken);
     bus.arm(at_ms(10)).unwrap();
     bus.set_raw(wheel, 300).unwrap();

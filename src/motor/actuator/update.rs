@@ -5,7 +5,7 @@ use super::power::Reading;
 use super::{Actuator, DriveProtocol, INQUIRY, Impedance, Target};
 use crate::frame::CanFrame;
 use crate::motor::{
-    Capability, Claim, Ingest, Link, Rest, Route, SILENCE_US, TargetError, Turn, Vitals,
+    Capability, Claim, Ingest, Link, Output, Rest, Route, SILENCE_US, TargetError, Vitals,
 };
 use crate::time::{Instant, TimeStep};
 use embedded_can::Frame;
@@ -34,16 +34,14 @@ impl<M: DriveProtocol> Actuator<M> {
     #[inline(never)]
     fn hear(&mut self, is_usual: bool, now: Instant) {
         self.is_steady &= is_usual;
-        let gap_us = self.guard.gap_us(now);
-        let is_silence =
-            self.guard.motor.is_silence(gap_us.unwrap_or(0), self.guard.device.timeouts());
-        self.watch.hear(gap_us, now);
+        let gap_us = self.guard.gap_us(now).unwrap_or(0);
+        let is_silence = self.guard.motor.is_silence(gap_us, self.guard.device.timeouts());
+        self.watch.hear(self.guard.gap_us(now), now);
         self.guard.hear(now);
         let has_reset = self.power.hear(self.motor.is_enabled(), now);
         if has_reset {
             self.watch.fail(&mut self.guard, self.motor.vitals().error_code, now);
         }
-        let gap_us = gap_us.unwrap_or(0);
         if has_reset || is_silence {
             self.motor.forget_settings();
             self.watch.forget_drive();
@@ -63,7 +61,10 @@ impl<M: DriveProtocol> Actuator<M> {
         let (velocity, at) = (self.motor.velocity(), now.stamp());
         let reading = self.motor.angle().map(|angle| Reading { angle, velocity, at });
         match self.joint.follow(reading, at, gap_us, is_silence) {
-            None => self.guard.lose_zero(now),
+            None => {
+                self.guard.lose_zero(now);
+                self.watch.fail(&mut self.guard, self.motor.vitals().error_code, now);
+            }
             Some(turns) if turns.as_radians() != 0.0 => {
                 self.target = self.target.moved(turns);
                 self.start.turn(turns);
@@ -165,8 +166,8 @@ impl<M: DriveProtocol> Actuator<M> {
         self.place_zero();
         let held = self.guard.pass(now, !step.is_hold());
         let left = self.check(now);
-        let turn = self.guard.turn(held);
-        if turn == Turn::Drive {
+        let output = self.guard.output(held);
+        if output == Output::Drive {
             if was_steady {
                 self.keep_on(left, true);
                 return true;
@@ -177,7 +178,7 @@ impl<M: DriveProtocol> Actuator<M> {
                 return true;
             }
         }
-        let may_drive = turn != Turn::Rest;
+        let may_drive = output != Output::Rest;
         // A question that is given back from now on did not enable the drive, and rest that nobody took was not sent.
         self.switched.take_if(|_| self.power.is_confirmed() && self.switching.is_none());
         self.offered.is_rest &= !self.offered.waits;
@@ -195,7 +196,7 @@ impl<M: DriveProtocol> Actuator<M> {
         self.offered.is_rest &= !was_on || self.power.is_on();
         let inquiry = self.inquire(now);
         let is_at_rest = !may_drive || !self.power.is_ready();
-        if !is_at_rest && turn == Turn::Drive {
+        if !is_at_rest && output == Output::Drive {
             self.follow(left, step);
             return true;
         }

@@ -164,23 +164,24 @@ impl<const N: usize> Journal<N> {
         self.length == 0 && !self.is_overfull
     }
 
-    /// Takes the oldest unread change of the motors, which is an edge, with the place of its motor.
+    /// Takes the oldest unread change of the motors, which is an edge, with the name of its motor.
     pub(crate) fn next_edge<M: Latched>(
         &mut self,
         motors: &mut [M],
         now: Instant,
-    ) -> Option<Edge<Condition, u8>> {
-        while let Some(Entry { motor: source, condition, began, at }) = self.pop() {
-            let motor = motors.get_mut(usize::from(source));
-            if motor.is_some_and(|motor| motor.latch().take(condition, began)) {
-                return Some(Edge { source, condition, began, at: fine(at, now) });
+        name: impl Fn(&M) -> Option<MotorName>,
+    ) -> Option<Edge<Condition, MotorName>> {
+        while let Some(Entry { motor, condition, began, at }) = self.pop() {
+            let Some(motor) = motors.get_mut(usize::from(motor)) else { continue };
+            if motor.latch().take(condition, began) {
+                return Some(Edge { source: name(motor)?, condition, began, at: fine(at, now) });
             }
         }
         let at = self.last_time(now);
-        for (source, motor) in (0..).zip(motors) {
+        for motor in motors {
             if let Some((condition, began)) = motor.latch().next() {
                 motor.latch().take(condition, began);
-                return Some(Edge { source, condition, began, at });
+                return Some(Edge { source: name(motor)?, condition, began, at });
             }
         }
         self.is_overfull = false;
@@ -315,9 +316,9 @@ mod tests {
     #[test]
     fn a_change_is_read_behind_those_that_found_no_room_before() {
         let mut journal = Journal::<1>::EMPTY;
-        let mut motors = [One(Latch::NONE), One(Latch::NONE)];
+        let mut motors = [1, 2].map(|id| One(MotorName::new("one", id), Latch::NONE));
         let set = |journal: &mut Journal<1>, motors: &mut [One; 2], motor: u8, holds| {
-            let latch = &mut motors[usize::from(motor)].0;
+            let latch = &mut motors[usize::from(motor)].1;
             let before = *latch;
             latch.set(Condition::Late, holds);
             journal.note(motor, &before, latch, NOW);
@@ -325,8 +326,8 @@ mod tests {
         set(&mut journal, &mut motors, 0, true);
         set(&mut journal, &mut motors, 1, true);
         let read = |journal: &mut Journal<1>, motors: &mut [One; 2]| {
-            let edge = journal.next_edge(motors, NOW)?;
-            Some((edge.source, edge.began))
+            let edge = journal.next_edge(motors, NOW, |motor| Some(motor.0))?;
+            Some((edge.source.id() - 1, edge.began))
         };
         assert_eq!(read(&mut journal, &mut motors), Some((0, true)));
         set(&mut journal, &mut motors, 1, false);
@@ -336,11 +337,11 @@ mod tests {
         assert_eq!(read(&mut journal, &mut motors), Some((1, true)), "room again");
     }
 
-    struct One(Latch);
+    struct One(MotorName, Latch);
 
     impl Latched for One {
         fn latch(&mut self) -> &mut Latch {
-            &mut self.0
+            &mut self.1
         }
     }
 

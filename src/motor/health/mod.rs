@@ -136,7 +136,7 @@ impl core::fmt::Display for Health {
 /// |---|---|---|
 /// | [`Late`](Self::Late) | there is no fresh feedback | is safe, and goes on by itself |
 /// | [`Offline`](Self::Offline) | the motor is lost, until ten good frames in a row | is relaxed |
-/// | [`PositionUncertain`](Self::PositionUncertain) | turns may have been missed, until the position is set | goes on, a geared motor of `dji` that was zeroed without positions; an actuator and a joint of `snake` have lost their zero, if any, and are relaxed |
+/// | [`PositionUncertain`](Self::PositionUncertain) | turns may have been missed, until the position is set | goes on; a geared motor of `dji` with a zero refuses positions; an actuator and a joint of `snake` have lost their zero, if any, and are relaxed |
 /// | [`Warning`](Self::Warning) | the ESC reports a warning | goes on |
 /// | [`Fault`](Self::Fault) | the ESC reports a fault, has started again, or was found in a state that it was not told | is relaxed |
 /// | [`Warm`](Self::Warm) | the motor is above its warning temperature | has less output |

@@ -12,7 +12,7 @@
 //! | is the motor healthy? | `MotorGuard::judge`, `MotorGuard::react` | tripped, as configured; relaxed if no share of the output is left |
 //! | is the motor armed, by a gesture? | `MotorGuard::admit`, `DeviceGuard::engage` | no target is taken |
 //! | does a target from a zero have that zero? | `MotorGuard::require_zero` | relaxed, and the target is not taken |
-//! | does the motor go on from its last command? | `MotorGuard::turn`, `MotorGuard::end_rest` | no command is repeated; the loops start afresh, or after a pause take no rate |
+//! | does the motor go on from its last command? | `MotorGuard::output`, `MotorGuard::end_rest` | no command is repeated; the loops start afresh, or after a pause take no rate |
 //! | how far is the output range open, and which of its directions? | `MotorGuard::range` | that share of the full command |
 //!
 //! Ages count in each update whose time moved on, with a usable step or without. The first of some updates in a row without a usable step repeats
@@ -71,7 +71,7 @@ pub(crate) enum Hold {
 
 /// Action of an update for a motor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Turn {
+pub(crate) enum Output {
     /// Run its loops.
     Drive,
     /// Send its last command once more.

@@ -2,7 +2,7 @@
 
 use super::{ALL, JUMP, LAST, Rules, Slot, Standing};
 use crate::encoder::{self, Homing, Position};
-use crate::motor::{Condition, Health, Hold, Link, Traffic, Turn};
+use crate::motor::{Condition, Health, Hold, Link, Output, Traffic};
 use crate::snake::model::PULSES_PER_TURN;
 use crate::snake::{Register, State};
 use crate::time::{Duration, Instant};
@@ -60,9 +60,9 @@ impl Slot {
                 None => self.window_from = now,
             }
             self.traffic.count();
-            let timeouts = *rules.timeouts();
+            let is_silence = self.guard.is_silence(gap_us, rules.timeouts());
             rules.hear(self, self.place(), now, |slot| {
-                if slot.guard.is_silence(gap_us, &timeouts) {
+                if is_silence {
                     slot.lose_zero();
                 }
             });
@@ -74,10 +74,8 @@ impl Slot {
 
     /// Handles a drive in an unexpected state: its zero may differ, so the joint stays relaxed until armed again.
     fn distrust(&mut self, rules: &mut Rules, now: Instant) {
-        rules.change(self, self.place(), now, |slot| {
-            slot.guard.fail(slot.stall.health());
-            slot.lose_zero();
-        });
+        rules.change(self, self.place(), now, |slot| slot.guard.fail(slot.stall.health()));
+        rules.change(self, self.place(), now, Self::lose_zero);
         // Of a joint that is not armed too: a request to arm counts once the jumps are over.
         rules.trip();
     }
@@ -99,12 +97,12 @@ impl Slot {
         let now = rules.updated();
         let is_stalled = is_stalled(self, now);
         if is_stalled || !is_quiet || self.guard.link() != Link::Online {
-            let is_alone = held.is_none().then_some(rules.is_alone());
+            let is_alone = held.is_none().then(|| rules.is_alone());
             rules.change(self, self.place(), now, |slot| check(slot, is_stalled, is_alone, now));
             let waits = is_stalled || self.guard.latch.has(Condition::SecondMaster);
             rules.wake_at(if waits { now } else { self.window_from + Traffic::WINDOW });
         }
-        let drives = self.guard.turn(held) != Turn::Rest;
+        let drives = self.guard.output(held) != Output::Rest;
         if drives {
             self.guard.end_rest();
         }

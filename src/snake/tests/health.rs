@@ -94,7 +94,7 @@ fn a_drive_that_is_not_what_it_was_is_a_fault_until_it_is_armed() {
     bench.drive(200);
     bench.enabled[8] = 0;
     bench.drive(300);
-    assert_eq!(edges(&mut bench.joints), [(9, PositionUncertain, true), (9, Fault, true)]);
+    assert_eq!(edges(&mut bench.joints), [(9, Fault, true), (9, PositionUncertain, true)]);
     bench.joints.arm(at_ms(bench.ms)).unwrap();
     assert_eq!(edges(&mut bench.joints), [(9, Fault, false)]);
     bench.drive(100);
