@@ -215,20 +215,6 @@ impl<const N: usize> Motors<N> {
         changed.unwrap_or(Err(TargetError::Detached))
     }
 
-    /// Notes feedback before the first update.
-    #[cold]
-    #[inline(never)]
-    pub(super) fn pass_unwatched(&mut self, now: Instant) {
-        let (guard, slots) = self.parts();
-        guard.pass_unwatched(slots, now);
-    }
-
-    /// [Changes](Self::change) each slot that may be in use.
-    pub(super) fn change_all(&mut self, now: Instant, change: impl Fn(&mut Slot)) {
-        let (guard, slots) = self.parts();
-        guard.change_all(slots, now, change);
-    }
-
     /// Sets the remaining way and the rate of a motor, both measured by another sensor at the time `at`.
     pub(super) fn set_measured(
         &mut self,

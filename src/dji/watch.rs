@@ -44,9 +44,8 @@ pub(super) fn ingest<const N: usize>(
     if running && has_nothing_new(motors, index, feedback, now) {
         return Ingest::Taken;
     }
-    if !running {
-        motors.pass_unwatched(now);
-    }
+    let (guard, slots) = motors.parts();
+    guard.hear_first(slots, now);
     let timeouts = *motors.guard.timeouts();
     #[expect(clippy::cast_possible_truncation, reason = "below 11")]
     let in_time = motors.change(index as u8, now, |slot| {
@@ -167,12 +166,13 @@ fn hear_command<const N: usize>(motors: &mut Motors<N>, outbox: &Outbox, id: u32
     if motors.round.echoes || !outbox.is_in_use(frame) {
         return;
     }
-    motors.guard.hear_rival(now.stamp());
-    motors.change_all(now, |slot| {
+    let (guard, slots) = motors.parts();
+    let begin = |slot: &mut Slot| {
         if slot.facts().is_some() && slot.place.frame() == frame {
             health::begin(slot, Condition::SecondMaster);
         }
-    });
+    };
+    guard.hear_rival(now, |guard| guard.change_all(slots, now, begin));
 }
 
 /// Takes the oldest unread edge.

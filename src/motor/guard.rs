@@ -79,9 +79,7 @@ impl Guard {
     #[cold]
     #[inline(never)]
     fn hear_anytime(&mut self, now: Instant) {
-        if !self.device.is_running() {
-            self.device.pass_unwatched(core::slice::from_mut(&mut self.motor), now);
-        }
+        self.device.hear_first(core::slice::from_mut(&mut self.motor), now);
         self.device.hear(&mut self.motor, 0, now, |_| {});
     }
 
@@ -99,9 +97,8 @@ impl Guard {
 
     /// Notes a command of the motor by another node.
     pub(super) fn hear_rival(&mut self, now: Instant, change: impl FnOnce(&mut MotorGuard)) {
-        self.device.hear_rival(now.stamp());
-        self.change(now, change);
-        self.device.wake_at(self.device.updated());
+        let Self { device, motor } = self;
+        device.hear_rival(now, |device| device.change(motor, 0, now, change));
     }
 
     /// Changes the motor, and notes the consequences.
@@ -121,9 +118,6 @@ impl Guard {
     #[inline]
     pub fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
         self.motor.admit(is_finite)?;
-        if !self.motor.has_target() {
-            self.device.disturb();
-        }
         self.motor.take_target(self.device.now());
         Ok(())
     }

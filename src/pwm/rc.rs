@@ -8,9 +8,6 @@ use crate::time::{Duration, Edge, Instant, Tick, TimeStep};
 use crate::units::AngularVelocity;
 use embedded_hal::pwm::SetDutyCycle;
 
-/// Nothing is integrated here.
-const ANY_STEP_S: f32 = f32::INFINITY;
-
 /// An RC ESC or servo on a PWM channel.
 ///
 /// The motor sends no feedback, so feedback cannot be missing; the motion is up to the ESC.
@@ -212,7 +209,7 @@ impl<P: SetDutyCycle> RcPwm<P> {
     /// # Errors
     /// The error of the channel; the next call tries again.
     pub fn update(&mut self, tick: Tick) -> Result<(), P::Error> {
-        let is_hold = TimeStep::new(tick.dt_s(), ANY_STEP_S).is_hold();
+        let is_hold = TimeStep::of_motor(tick.dt_s()).is_hold();
         let held = self.guard.pass(tick.now(), !is_hold);
         if held == Some(Hold::LoseTime) {
             // Nobody knows for how long neutral was sent.

@@ -10,9 +10,6 @@ use embedded_can::Frame;
 /// Upper bound on how long a stop may wait for an outstanding reply.
 const LONGEST_REPLY: Duration = Duration::from_millis(10);
 
-/// Any time step is usable: the loops are in the drives.
-const ANY_STEP_S: f32 = f32::INFINITY;
-
 impl Joints {
     /// Makes a bus without joints. Feedback is late after 40 ms, since each of twelve joints is polled for its position every 12 or 24 ms.
     /// A joint is offline after 100 ms, and a target expires after 100 ms.
@@ -132,8 +129,8 @@ impl Joints {
     pub fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
         let index = frame.header().wrapping_sub(1) as usize;
         let reply = Register::from_reply(frame.data());
-        if reply.is_some() && !self.guard.is_running() {
-            self.pass_unwatched(index, now);
+        if reply.is_some() && self.slots.get(index).is_some_and(|slot| slot.id.is_some()) {
+            self.guard.hear_first(&mut self.slots, now);
         }
         let Some(slot) = self.slots.get_mut(index) else { return Ingest::Unrelated };
         let (counters, rules) = (&mut self.counters, &mut self.guard);
@@ -156,11 +153,11 @@ impl Joints {
                     return Ingest::Unrelated;
                 }
                 count(&mut counters.foreign_commands);
-                rules.hear_rival(now.stamp());
-                rules.change(slot, slot.place(), now, |slot| {
-                    slot.guard.judge(Condition::SecondMaster, true, slot.stall.health());
+                rules.hear_rival(now, |rules| {
+                    rules.change(slot, slot.place(), now, |slot| {
+                        slot.guard.judge(Condition::SecondMaster, true, slot.stall.health());
+                    });
                 });
-                rules.disturb();
             }
             None => count(match frame.length() {
                 6 => &mut counters.bad_field,
@@ -174,15 +171,6 @@ impl Joints {
         }
     }
 
-    /// Notes the time of a reply before the first update.
-    #[cold]
-    #[inline(never)]
-    fn pass_unwatched(&mut self, index: usize, now: Instant) {
-        if self.slots.get(index).is_some_and(|slot| slot.id.is_some()) {
-            self.guard.pass_unwatched(&mut self.slots, now);
-        }
-    }
-
     /// Chooses the joints for requests and writes, and relaxes joints that may not be driven.
     ///
     /// An update before the arming, or not after the previous one, relaxes every joint until armed again. A `dt_s` of zero, below zero, infinite or
@@ -192,7 +180,7 @@ impl Joints {
     /// Costs 2922 instructions on a Cortex-M4F, for 12 joints, with the frames out and an answer in (`docs/figures.md`).
     pub fn update(&mut self, tick: Tick) {
         let before = self.guard.begin(tick.now());
-        let has_step = !TimeStep::new(tick.dt_s(), ANY_STEP_S).is_hold();
+        let has_step = !TimeStep::of_motor(tick.dt_s()).is_hold();
         let is_quiet = has_step && self.guard.is_quiet(before, tick.now());
         if !is_quiet {
             if let Some(hold) = self.guard.pass(&mut self.slots, before, has_step, u32::MAX) {

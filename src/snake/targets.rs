@@ -218,11 +218,7 @@ impl Joints {
     ) -> Result<(), TargetError> {
         let now = self.guard.now();
         let slot = self.slot_mut(joint).ok_or(TargetError::Detached)?;
-        let had_target = slot.guard.has_target();
         let outcome = slot.admit(is_finite, now).map(|()| set(slot));
-        if outcome.is_ok() && !had_target {
-            self.guard.disturb();
-        }
         // A refused target also cancels the present one.
         self.let_go(joint.index());
         outcome

@@ -162,15 +162,19 @@ impl<const N: usize> DeviceGuard<N> {
     /// Discards each stamp whose age a 32-bit counter can no longer represent; after a pause, discards all stamps.
     ///
     /// Called after a pause, and with feedback before the first update.
+    #[cold]
     fn forget_bygones<M: Guarded>(&mut self, motors: &mut [M], before: Instant) {
         let (now, is_pause) = (self.updated.stamp(), self.is_pause(before));
         self.change_all(motors, self.updated, |motor| motor.guard().forget_bygones(now, is_pause));
     }
 
-    /// Notes feedback before the first update, which moves the time on.
-    pub(crate) fn pass_unwatched<M: Guarded>(&mut self, motors: &mut [M], now: Instant) {
-        let before = core::mem::replace(&mut self.updated, now);
-        self.forget_bygones(motors, before);
+    /// Notes the time of feedback: before the first update, feedback moves the time on.
+    #[inline]
+    pub(crate) fn hear_first<M: Guarded>(&mut self, motors: &mut [M], now: Instant) {
+        if !self.is_running {
+            let before = core::mem::replace(&mut self.updated, now);
+            self.forget_bygones(motors, before);
+        }
     }
 
     /// Changes each motor.
@@ -241,9 +245,12 @@ impl<const N: usize> DeviceGuard<N> {
         self.held_steps
     }
 
-    /// Notes a command of another node: the motors of the command have a [second master](crate::motor::Condition::SecondMaster).
-    pub(crate) const fn hear_rival(&mut self, now: u32) {
-        self.rival_heard = now;
+    /// Notes a command of another node, whose motors `change`: they have a [second master](crate::motor::Condition::SecondMaster) until the
+    /// other node is silent for a second.
+    pub(crate) fn hear_rival(&mut self, now: Instant, change: impl FnOnce(&mut Self)) {
+        self.rival_heard = now.stamp();
+        change(self);
+        self.disturb();
     }
 
     /// Tells whether no other node has sent a command for a second.

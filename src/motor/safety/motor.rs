@@ -23,11 +23,6 @@ impl InTime {
         micros < self.0 >> Self::COUNT_BITS
     }
 
-    #[inline(always)]
-    pub(crate) const fn count(&mut self) {
-        self.0 = self.0.wrapping_add(1);
-    }
-
     /// Returns the count since the last call.
     pub(crate) const fn take(&mut self) -> u16 {
         let [low, high, ..] = (self.0 & Self::COUNT).to_le_bytes();
@@ -185,7 +180,7 @@ impl MotorGuard {
     #[inline(always)]
     pub(crate) const fn hear_in_time(&mut self, now: u32) {
         self.heard = now;
-        self.in_time.count();
+        self.in_time.0 = self.in_time.0.wrapping_add(1);
     }
 
     /// Sets the trusted gap; 0 unless the motor is online.
@@ -236,7 +231,7 @@ impl MotorGuard {
         if self.has_target && !is_near(now, self.commanded, timeouts.command_us()) {
             self.forget_target();
         }
-        is_settled
+        is_settled && !self.latch.has(Condition::CommandLost)
     }
 
     fn set_late(&mut self) {
