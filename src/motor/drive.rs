@@ -269,7 +269,7 @@ impl core::fmt::Display for TargetError {
             Self::Relaxed => "the motor was relaxed by a fault: arm it again",
             Self::NoLoop => "the motor was attached without the loop for this target",
             Self::NotHomed => {
-                "the output angle is unknown until the present position or angle is set"
+                "the output angle is unknown until zeroed, or the present position or angle is set"
             }
             Self::Unsupported => "the motor does not offer this kind of target",
             Self::StaleMeasurement => "the measurement is too old",

@@ -166,14 +166,10 @@ impl Guard {
         None
     }
 
-    /// Tells what the tick does, after [`pass`](Self::pass) and the health; at rest without a target, the loops will start afresh.
+    /// Tells what the tick does, after [`pass`](Self::pass) and the health.
     #[inline]
-    pub(crate) fn output(&mut self, held: Option<Hold>) -> Output {
-        let output = self.motor.output(held);
-        if output == Output::Rest && !self.motor.has_target() {
-            self.motor.relax();
-        }
-        output
+    pub(crate) fn output(&self, held: Option<Hold>) -> Output {
+        self.motor.output(held)
     }
 
     /// Ends the rest, as the loops run, and returns its kind.
@@ -532,6 +528,28 @@ mod tests {
             guard.hear(at_ms(2));
             assert!(!guard.ask() && !guard.engage(at_ms(2)) && !guard.drives(at_ms(2)));
         }
+    }
+
+    /// Quiet updates lie between the expiry and the next target.
+    #[test]
+    fn an_expired_target_is_over_in_the_first_update_with_another() {
+        let mut guard = driving();
+        let has_expired = |guard: &Guard| guard.conditions().contains(Condition::CommandLost);
+        for ms in 2..=200 {
+            guard.hear(at_ms(ms));
+            assert_eq!(guard.drives(at_ms(ms)), ms <= 101, "{ms}");
+            assert_eq!(has_expired(&guard), ms > 101, "{ms}");
+        }
+        guard.admit(true).unwrap();
+        assert!(has_expired(&guard) && guard.drives(at_ms(201)) && !has_expired(&guard));
+    }
+
+    #[test]
+    fn a_trip_disarms_and_needs_a_pause() {
+        let mut guard = driving();
+        guard.trip();
+        assert_eq!(guard.admit(true), Err(TargetError::Disarmed));
+        assert!(!guard.ask() && !guard.engage(at_ms(1)));
     }
 
     #[test]

@@ -20,8 +20,8 @@
 //! | [`ConfigError`](crate::error::ConfigError) | fault of a configuration |
 //!
 //! The motors follow the rules of all motors here, by the same [`Guard`](crate::motor::Guard): disarmed at the start; a
-//! target that is old, NaN or infinite, a bad time step, time that stands or goes back, lost feedback and an emergency
-//! stop give the safe output. Each change is an [`Edge`](crate::time::Edge), pending in `next_edge`. The motors are not
+//! target that is old, NaN or infinite, time that stands or goes back, lost feedback and an emergency stop give the safe
+//! output. Of bad time steps in a row, the first keeps the output unless it comes late, and the others give the safe output. Each change is an [`Edge`](crate::time::Edge), pending in `next_edge`. The motors are not
 //! [`Devices`](crate::motor::Devices), so the program calls `update` in each tick itself. With
 //! [`VelocityDrive`](crate::motor::VelocityDrive) they drive a chassis like any other motor.
 //!

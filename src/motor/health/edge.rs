@@ -242,6 +242,7 @@ mod tests {
     use crate::time::Duration;
     use proptest::prelude::*;
     use std::collections::BTreeSet;
+    use std::string::ToString;
     use std::vec::Vec;
 
     const NOW: Instant = Instant::from_micros(5_000_000);
@@ -323,6 +324,7 @@ mod tests {
             latch.set(Condition::Late, holds);
             journal.note(motor, &before, latch, NOW);
         };
+        assert!(journal.is_empty());
         set(&mut journal, &mut motors, 0, true);
         set(&mut journal, &mut motors, 1, true);
         let read = |journal: &mut Journal<1>, motors: &mut [One; 2]| {
@@ -330,11 +332,20 @@ mod tests {
             Some((edge.source.id() - 1, edge.began))
         };
         assert_eq!(read(&mut journal, &mut motors), Some((0, true)));
+        assert!(!journal.is_empty(), "the other has no time, and is not read yet");
         set(&mut journal, &mut motors, 1, false);
         let rest = core::array::from_fn(|_| read(&mut journal, &mut motors));
         assert_eq!(rest, [Some((1, true)), Some((1, false)), None]);
         set(&mut journal, &mut motors, 1, true);
         assert_eq!(read(&mut journal, &mut motors), Some((1, true)), "room again");
+    }
+
+    #[test]
+    fn an_edge_names_its_motor() {
+        let source = MotorName::new("fan", 3);
+        let edge = Edge { source, condition: Condition::Late, began: true, at: NOW };
+        let of_nobody = Edge { source: (), condition: Condition::Late, began: true, at: NOW };
+        assert_eq!(edge.to_string(), std::format!("{source}: {of_nobody}"));
     }
 
     struct One(MotorName, Latch);

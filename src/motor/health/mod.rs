@@ -136,7 +136,7 @@ impl core::fmt::Display for Health {
 /// |---|---|---|
 /// | [`Late`](Self::Late) | there is no fresh feedback | is safe, and goes on by itself |
 /// | [`Offline`](Self::Offline) | the motor is lost, until ten good frames in a row | is relaxed |
-/// | [`PositionUncertain`](Self::PositionUncertain) | turns may have been missed, until the position is set | goes on; a geared motor of `dji` with a zero refuses positions; an actuator and a joint of `snake` have lost their zero, if any, and are relaxed |
+/// | [`PositionUncertain`](Self::PositionUncertain) | turns may have been missed, or the zero is lost, until the position is set | goes on (`dji`; with a gearbox and a zero, positions are refused); is relaxed, and its zero is lost (actuator, joint of `snake`) |
 /// | [`Warning`](Self::Warning) | the ESC reports a warning | goes on |
 /// | [`Fault`](Self::Fault) | the ESC reports a fault, has started again, or was found in a state that it was not told | is relaxed |
 /// | [`Warm`](Self::Warm) | the motor is above its warning temperature | has less output |
@@ -149,6 +149,7 @@ impl core::fmt::Display for Health {
 /// | [`SoftLimit`](Self::SoftLimit) | the shaft is at or outside of a soft limit; of an actuator also 0.02 rad inside, and where its angle is not known | turns inward only; rests without an angle |
 /// | [`CommandLost`](Self::CommandLost) | the application let the target expire | is relaxed, until the next target |
 /// | [`SecondMaster`](Self::SecondMaster) | another node sends the command frame of the motor | as configured; goes on |
+/// | [`ClockFault`](Self::ClockFault) | the time of an update did not move on, until it does | is relaxed |
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
