@@ -399,7 +399,7 @@ const SIZES: [(&str, usize); 6] = [
 const MOST_TYPES: usize = 8;
 
 /// The families with a bus of their own, with the most lines of code in all of their folders: those of today.
-const SIZES_WITH_A_BUS: [(&str, usize); 2] = [("dji", 3325), ("snake", 1471)];
+const SIZES_WITH_A_BUS: [(&str, usize); 2] = [("dji", 3325), ("snake", 1473)];
 
 /// A figure of the house and its bound; `.ci/size` prints these lines.
 fn hold(what: &str, value: usize, most: usize) {

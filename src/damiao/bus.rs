@@ -29,7 +29,7 @@ const CHECKED: [Register; 4] = [
 
 /// A motor of this family in a control mode: see the [module](super).
 ///
-/// Costs 2726 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
+/// Costs 2738 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
 ///
 /// Costs 75 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
 ///

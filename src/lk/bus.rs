@@ -33,7 +33,7 @@ const ECHOES: u8 = 3;
 
 /// A motor of this family in a control mode: see the [module](super).
 ///
-/// Costs 4269 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
+/// Costs 4282 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
 ///
 /// Costs 189 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
 ///

@@ -118,7 +118,7 @@ impl Guard {
     #[inline]
     pub fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
         self.motor.admit(is_finite)?;
-        self.motor.take_target(self.device.now());
+        self.device.take_target(&mut self.motor);
         Ok(())
     }
 
@@ -309,8 +309,17 @@ impl Default for Guard {
     }
 }
 
-/// Feedback and measurements of the motors of a device.
+/// Targets, measurements and feedback of the motors of a device.
 impl<const N: usize> DeviceGuard<N> {
+    /// Sets the target of a motor. The next update notes that it came after an expired one.
+    #[inline]
+    pub(crate) const fn take_target(&mut self, motor: &mut MotorGuard) {
+        if !motor.has_target() {
+            self.disturb();
+        }
+        motor.take_target(self.now());
+    }
+
     /// Returns the stamp of a target measured by another sensor, which expires sooner than others; `None` if measured too long ago, or too
     /// far ahead.
     pub(crate) fn stamp_of_measurement(&self, at: Instant) -> Option<u32> {

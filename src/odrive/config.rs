@@ -9,7 +9,7 @@ use crate::units::AngularVelocity;
 
 /// A motor of this family in a control mode: see the [module](super).
 ///
-/// Costs 3923 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
+/// Costs 3936 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
 ///
 /// Costs 92 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
 ///

@@ -13,7 +13,7 @@ const TIMEOUT_MS: u32 = 100;
 
 /// A motor of this family, in one control mode: see the [module](super).
 ///
-/// Costs 4093 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
+/// Costs 4109 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
 ///
 /// Costs 149 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
 ///

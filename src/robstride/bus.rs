@@ -21,7 +21,7 @@ const COMMANDS: [(u32, u32); 3] =
 
 /// A motor of this family in a run mode: see the [module](super).
 ///
-/// Costs 3752 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
+/// Costs 3762 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
 ///
 /// Costs 139 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
 ///

@@ -234,13 +234,11 @@ impl Slot {
         self.turn = (self.turn + TURNS - 1) % TURNS;
     }
 
-    /// Takes a new target. A drive whose zero was lost may count from another angle, whole turns away.
+    /// Tells whether a new target may be taken. A drive whose zero was lost may count from another angle, whole turns away.
     #[inline]
-    pub(super) fn admit(&mut self, is_finite: bool, now: u32) -> Result<(), TargetError> {
+    pub(super) fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
         self.guard.admit(is_finite)?;
-        self.guard.require_zero((self.homing != Homing::Uncertain).then_some(()))?;
-        self.guard.take_target(now);
-        Ok(())
+        self.guard.require_zero((self.homing != Homing::Uncertain).then_some(()))
     }
 
     /// Sets a target in pulses from the joint's zero.

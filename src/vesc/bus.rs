@@ -28,7 +28,7 @@ const ORDERS: u8 = 50;
 
 /// A motor on a VESC, in a control mode: see the [module](super).
 ///
-/// Costs 3802 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
+/// Costs 3811 instructions on a Cortex-M4F, for a tick of eight with our speed loops (`docs/figures.md`).
 ///
 /// Costs 145 instructions on a Cortex-M4F, for a frame to one of eight (`docs/figures.md`).
 ///

@@ -231,7 +231,7 @@ impl MotorGuard {
         if self.has_target && !is_near(now, self.commanded, timeouts.command_us()) {
             self.forget_target();
         }
-        is_settled && !self.latch.has(Condition::CommandLost)
+        is_settled
     }
 
     fn set_late(&mut self) {
