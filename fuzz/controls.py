@@ -143,7 +143,7 @@ DEFECTS = [
     ("snake", "feedback stays fresh where time is lost", "src/motor/safety/motor.rs",
      "if self.listens && self.link == Link::Online {\n            self.set_late();\n        }\n        self.trip();", "self.trip();"),
     ("snake", "joints do not notice time that is lost", "src/snake/bus.rs",
-     "if let Some(hold) = held {", "if let Some(hold @ (Hold::Keep | Hold::Rest)) = held {"),
+     "if let Some(hold) = self.guard.pass(", "if let Some(hold @ (Hold::Keep | Hold::Rest)) = self.guard.pass("),
     ("snake", "any request to the joints counts", "src/snake/device.rs",
      "        self.guard.ask()\n", "        self.guard.ask() || true\n"),
     ("snake", "arming again makes a target younger", "src/snake/device.rs",
