@@ -77,20 +77,11 @@ impl HealthConfig {
 
     /// Sets the reaction to the begin of a condition.
     ///
-    /// Late or lost feedback, expired targets and soft limits have their own rules: for these, and for [`Condition::PositionUncertain`],
-    /// `with_reaction` has no effect. If [`Condition::Warm`] is ignored, there is no derating. If [`Condition::Hot`] is ignored, there is
+    /// Late or lost feedback, expired targets, lost time, soft limits and [`Condition::PositionUncertain`] have their own rules: a configuration
+    /// with [`Reaction::Ignore`] or [`Reaction::Relax`] for one of these is [refused](Self::validate). If [`Condition::Warm`] is ignored, there is no derating. If [`Condition::Hot`] is ignored, there is
     /// no limit.
     #[must_use]
     pub const fn with_reaction(mut self, condition: Condition, reaction: Reaction) -> Self {
-        const OWN_RULES: Conditions = Conditions::NONE
-            .with(Condition::Late)
-            .with(Condition::Offline)
-            .with(Condition::CommandLost)
-            .with(Condition::SoftLimit)
-            .with(Condition::PositionUncertain);
-        if OWN_RULES.contains(condition) {
-            return self;
-        }
         self.ignored = self.ignored.without(condition);
         self.relaxing = self.relaxing.without(condition);
         match reaction {
@@ -191,6 +182,16 @@ impl HealthConfig {
     /// # Errors
     /// Names the first unusable parameter.
     pub const fn validate(&self) -> Result<(), &'static str> {
+        const OWN_RULES: Conditions = Conditions::NONE
+            .with(Condition::Late)
+            .with(Condition::Offline)
+            .with(Condition::CommandLost)
+            .with(Condition::ClockFault)
+            .with(Condition::SoftLimit)
+            .with(Condition::PositionUncertain);
+        if !self.ignored.or(self.relaxing).and(OWN_RULES).is_empty() {
+            return Err("health reaction");
+        }
         if let Some((warning, limit)) = self.temperatures_c {
             if warning >= limit {
                 return Err("health temperatures");
@@ -293,11 +294,12 @@ mod tests {
 
     #[test]
     fn what_has_a_rule_of_its_own_has_no_reaction() {
-        use Condition::{CommandLost, Late, Offline, PositionUncertain, SoftLimit};
-        for condition in [Late, Offline, CommandLost, SoftLimit, PositionUncertain] {
+        use Condition::{ClockFault, CommandLost, Late, Offline, PositionUncertain, SoftLimit};
+        let own = [Late, Offline, CommandLost, ClockFault, SoftLimit, PositionUncertain];
+        for condition in Condition::ALL {
             for reaction in [Reaction::Ignore, Reaction::Relax] {
                 let config = HealthConfig::new().with_reaction(condition, reaction);
-                assert_eq!(config, HealthConfig::new(), "{condition}");
+                assert_eq!(config.validate().is_err(), own.contains(&condition), "{condition}");
             }
         }
     }
