@@ -15,7 +15,7 @@ use crate::time::{Duration, Instant};
 ///
 /// ```text
 /// feedback ──> hear(now)          target ──> admit(is_finite)?
-///                                 tick   ──> drives(now)?  then its output, otherwise zero and loops reset
+///                                 tick   ──> drives(now)?  then its output, otherwise zero
 /// ```
 ///
 /// # Examples
@@ -127,8 +127,9 @@ impl Guard {
         self.motor.require_zero(target)
     }
 
-    /// Moves the time on to a tick and tells whether the motor may be driven in this tick. If not, send zero. If
-    /// [`has_target`](Self::has_target) is `false` as well, reset the loops.
+    /// Moves the time on to a tick and tells whether the motor may be driven in this tick. If not, send zero; and reset the loops if
+    /// [`has_target`](Self::has_target) is `false`, unless the [`link`](Self::link) is only late: a target that is refused meanwhile leaves the integral
+    /// of a motor of this crate as it is.
     #[must_use]
     #[inline]
     pub fn drives(&mut self, now: Instant) -> bool {
@@ -192,7 +193,7 @@ impl Guard {
         self.motor.open(self.device.now());
     }
 
-    /// Trips: discards the target and refuses others until the motor is armed again.
+    /// Trips an armed motor, for a fault of its drive: discards the target and refuses others until the motor is armed again.
     pub fn relax_until_armed(&mut self) {
         self.change(self.device.updated(), MotorGuard::trip);
     }
@@ -242,8 +243,9 @@ impl Guard {
         self.device.ask()
     }
 
-    /// Allows targets from now on, beginning without a target, if the motor is online and, after a trip, the last request
-    /// [counts](Self::ask). An armed motor keeps its target; later targets have the time `now`, and an update before `now` trips. While stopped, `engage` has no effect. Returns whether the motor was armed.
+    /// Arms at the time `now`: allows targets, beginning without one, unless feedback is [missing](Self::is_missing), or a trip waits for a request that
+    /// [counts](Self::ask). A motor that is armed already keeps its target. Targets set before the next update have the time `now`; an update before `now` trips. While
+    /// stopped, `engage` has no effect. Returns whether the motor was armed.
     pub fn engage(&mut self, now: Instant) -> bool {
         let motors = core::slice::from_mut(&mut self.motor);
         self.device.engage(motors, now, |_, _| true, |_| {})
@@ -254,7 +256,7 @@ impl Guard {
         self.motor.disarm();
     }
 
-    /// Disarms, and requires a new request to arm.
+    /// Disarms, and requires a new request to arm, of a motor that is not armed too: for a fault of what surrounds the motor, its bus for example.
     pub const fn trip(&mut self) {
         self.motor.disarm();
         self.device.trip();

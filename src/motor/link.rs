@@ -132,13 +132,13 @@ impl Timeouts {
         Self { good_frames: if good_frames == 0 { 1 } else { good_frames }, ..self }
     }
 
-    /// Returns the age from which feedback is late.
+    /// Returns the age above which feedback is late.
     #[must_use]
     pub const fn late(&self) -> Duration {
         Duration::from_micros(self.late_us as u64)
     }
 
-    /// Returns the age from which a motor is offline.
+    /// Returns the age above which a motor is offline.
     #[must_use]
     pub const fn offline(&self) -> Duration {
         Duration::from_micros(self.offline_us as u64)

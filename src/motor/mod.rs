@@ -30,7 +30,7 @@
 //! of devices are [`Devices`]; a struct of devices names its parts in one method.
 //!
 //! # States
-//! The rules of all families have two states for each motor. The [`Link`] follows the age of the feedback, by the limits of [`Timeouts`]:
+//! The rules of all families have two states for each motor. Where a cell of a table is empty, the state stays. The [`Link`] follows the age of the feedback, by the limits of [`Timeouts`]:
 //!
 //! | link | feedback is received | feedback is older than *late* | feedback is older than *offline* | lost time |
 //! |---|---|---|---|---|
