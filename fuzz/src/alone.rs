@@ -27,6 +27,8 @@ pub struct Alone {
     counted: u64,
     /// Since when its output range opens.
     pub opened: Option<u64>,
+    /// The last arming of which its bus knows, until time is lost.
+    armed_at: u64,
     /// Time did not move on since it was armed.
     pub lost_time: bool,
     /// It was driven by a target since it was last at rest.
@@ -68,6 +70,7 @@ impl Alone {
             driven_us: 0,
             counted: 0,
             opened: None,
+            armed_at: 0,
             lost_time: false,
             moved: false,
             first_velocity: false,
@@ -106,6 +109,10 @@ impl Alone {
     pub fn engage(&mut self, now: Instant) -> bool {
         let before = self.is_armed();
         let granted = self.bus.ask();
+        let missing = self.bus.missing(now).next().is_some();
+        if granted && self.motor.is_some() && !missing && self.bus.faulty().next().is_none() {
+            self.armed_at = self.armed_at.max(now.as_micros());
+        }
         self.bus.engage(now);
         if !before && self.is_armed() {
             self.rest();
@@ -144,6 +151,14 @@ impl Alone {
     pub fn update(&mut self, tick: Tick) {
         self.bus = core::mem::take(&mut self.bus).with_timeouts(self.timeouts);
         self.bus.update(tick);
+    }
+
+    /// Updates by a time that the whole bus refuses, as it does not lie after the last one, or lies before an arming. If this bus knows
+    /// nothing of that arming, the update has no step: as in the whole bus, no motor has its turn to be checked.
+    pub fn lose_update(&mut self, tick: Tick, is_after_the_last: bool) {
+        let armed_at = core::mem::take(&mut self.armed_at);
+        let knows = !is_after_the_last || tick.now().as_micros() < armed_at;
+        self.update(if knows { tick } else { Tick::new(tick.now(), f32::NAN) });
     }
 
     pub fn drain(&mut self, index: usize) {

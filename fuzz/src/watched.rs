@@ -501,7 +501,11 @@ impl CanDevice for Watched {
         let step = (!lost).then(|| self.updated.map_or(0, |updated| now - updated));
         self.gesture.update(step);
         self.noting_trips(|bus| bus.update(tick));
-        self.each_alone(|alone| alone.update(tick));
+        let is_after_the_last = self.updated.is_none_or(|updated| updated < now);
+        self.each_alone(|alone| match lost {
+            true => alone.lose_update(tick, is_after_the_last),
+            false => alone.update(tick),
+        });
         if lost {
             self.forget_the_unknowing();
         }
