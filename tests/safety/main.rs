@@ -7,8 +7,8 @@
 //! * whether a second master sends the commands of the motor, and which of them is named.
 //!
 //! The clocks wrap early, swing, jump and stand; the application sets, arms, stops and disarms at random, and may cease to at
-//! any moment; feedback comes at the time of the update, a little ahead, many times at once or not at all; one in ten time
-//! steps is not usable; edges are read all or one, at once or late; frames of another controller come.
+//! any moment; feedback comes at the time of the update, a little ahead, many times at once or not at all; one in seven time
+//! steps is not usable, and one in twenty is long; edges are read all or one, at once or late; frames of another controller come.
 
 #![cfg(test)]
 
@@ -256,7 +256,8 @@ impl<S: Subject<N>, const N: usize> Trial<S, N> {
             }
             self.check(now);
             let dt_s = random.pick([0.0, f32::NAN, -0.001, f32::INFINITY]);
-            self.update(now, if random.one_in(7) { dt_s } else { 0.001 });
+            let usable_s = if random.one_in(20) { 0.03 } else { 0.001 };
+            self.update(now, if random.one_in(7) { dt_s } else { usable_s });
             self.check(now);
             if random.one_in(manner.reads) {
                 self.read(random.one_in(2));
