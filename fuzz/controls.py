@@ -131,7 +131,7 @@ DEFECTS = [
     ("snake", "without a step no disable is sent again", "src/snake/bus.rs",
      "self.update_joints(false, Some(hold));\n        schedule::stop_again(self);\n", "self.update_joints(false, Some(hold));\n"),
     ("snake", "without a step an answer is waited for for ever", "src/snake/bus.rs",
-     "self.give_up((!(stands && held > self.reply_timeout)).then_some(self.reply_timeout));", "_ = (stands, is_long);"),
+     "self.give_up((!(stands && held > self.reply_timeout)).then_some(self.reply_timeout));", "_ = (stands, held);"),
     ("snake", "a frame given back is not counted", "src/snake/schedule.rs",
      "    drop_frames(joints, 1);\n    true\n", "    true\n"),
     ("snake", "an old speed is written", "src/snake/slot.rs",

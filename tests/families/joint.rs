@@ -6,8 +6,8 @@ use drivetrain::control::PidConfig;
 use drivetrain::error::ConfigError;
 use drivetrain::math::wrap_pi;
 use drivetrain::motor::{
-    Actuator, AngleDrive, Condition, Devices, DriveProtocol, Impedance, ImpedanceControl, Ingest,
-    Link, TargetError,
+    Actuator, AngleDrive, Condition, Conditions, Devices, DriveProtocol, Impedance,
+    ImpedanceControl, Ingest, Link, TargetError,
 };
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{DamiaoDrive, Drive, DriveShaft, Line, RobStrideDrive, Simulation};
@@ -285,14 +285,14 @@ fn brown_out(
     model: robstride::Model,
     start: f32,
     (dark_ms, is_on): (u64, bool),
-) -> (Option<Angle>, Option<Angle>, f32, bool) {
+) -> (Option<Angle>, Option<Angle>, f32, Conditions) {
     let world = Simulation::new(1);
     let mut drive = RobStrideDrive::of(model, 1).with_shaft(DriveShaft::new(0.05, 0.5));
     drive.shaft_mut().set_angle(start);
     let mode = ImpedanceControl::new(5.0).unwrap();
     let joint = Actuator::new(robstride::Motor::new(model, 1, mode).unwrap());
     let mut runner = Runner::new(Nb(world.controller()), world.clock(), joint);
-    let (mut before, mut turned, mut faults) = (None, 0.0_f32, false);
+    let (mut before, mut turned, mut edges) = (None, 0.0_f32, Conditions::NONE);
     for ms in 0..3_000_u64 {
         if ms == 1_000 {
             before = runner.device().angle(());
@@ -318,10 +318,10 @@ fn brown_out(
         _ = runner.device_mut().set_impedance(spring);
         runner.tick(tick);
         while let Some(edge) = runner.device_mut().next_edge() {
-            faults |= edge.condition == Condition::Fault && edge.began;
+            edges = if edge.began { edges.with(edge.condition) } else { edges };
         }
     }
-    (before, runner.device().angle(()), turned, faults)
+    (before, runner.device().angle(()), turned, edges)
 }
 
 #[test]
@@ -336,10 +336,12 @@ fn a_drive_that_starts_again_at_once_keeps_the_joint_where_it_is_or_loses_its_ze
             assert!(off(before) < 0.01 && off(after) < 0.01, "{case}: {after:?}");
             assert!(turned < 0.05, "{case}: the shaft turned by {turned} rad");
             // The CyberGear counts from where it is switched on.
-            let (before, after, turned, faults) =
+            let (before, after, turned, edges) =
                 brown_out(robstride::Model::CYBERGEAR, 1.5, (dark_ms, is_on));
             assert!(off(before) < 0.01 && after.is_none(), "{case}: {after:?}");
-            assert!(faults || dark_ms > 100, "{case}: no edge"); // lost feedback has its own
+            assert!(edges.contains(Condition::PositionUncertain), "{case}: {edges}");
+            let lost = if dark_ms > 100 { Condition::Offline } else { Condition::Fault };
+            assert!(edges.contains(lost), "{case}: {edges}");
             assert!(turned < 0.05, "{case}: the shaft turned by {turned} rad");
         }
     }

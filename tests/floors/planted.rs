@@ -15,7 +15,7 @@ fn found_with(file: &str, lines: &str) -> Vec<String> {
 }
 
 /// File, and a rule.
-const RULES: [(&str, &str); 49] = [
+const RULES: [(&str, &str); 59] = [
     // A motor trips by a flag.
     (
         "motor/actuator/update.rs",
@@ -176,6 +176,17 @@ const RULES: [(&str, &str); 49] = [
         "snake/slot.rs",
         "fn may_arm(stopped: bool) -> Result<(), ArmError> { if stopped { Err(ArmError::Stopped) } else { Ok(()) } }",
     ),
+    // Calls that change the state of a motor.
+    ("lk/bus.rs", "fn f(slot: &mut Slot) { slot.guard.relax(); }"),
+    ("pwm/rc.rs", "fn f(slot: &mut Slot) { slot.guard.disarm(); }"),
+    ("snake/bus.rs", "fn f(slot: &mut Slot, now: Instant) { slot.guard.engage(now); }"),
+    ("dji/bus.rs", "fn f(guard: &mut Guard) { guard.set_stop(true); }"),
+    ("pwm/brushed.rs", "fn f(guard: &mut Guard) { guard.clear_emergency_stop(); }"),
+    ("dji/bus.rs", "fn f(slot: &mut Slot, now: u32) { slot.guard.renew_target(now); }"),
+    ("dji/slot.rs", "fn f(slot: &mut Slot) { slot.guard.latch.set(Condition::Runaway, false); }"),
+    ("snake/bus.rs", "fn f(slot: &mut Slot) -> bool { slot.guard.latch.has(Condition::Fault) }"),
+    ("snake/slot.rs", "fn f(slot: &mut Slot, now: u32) { slot.guard.open(now); }"),
+    ("pwm/rc.rs", "fn f(dt_s: f32) -> bool { TimeStep::usable(dt_s, 0.02).is_none() }"),
     // A second master.
     (
         "snake/slot/health.rs",

@@ -39,16 +39,13 @@ const AGES: Seeds<'static> = Seeds {
         "begin",
         "dt_s",
         "elapsed",
-        "first_time",
         "furthest",
         "gap_us",
         "held_steps",
         "last_time",
         "now",
-        "pass_unwatched",
         "since",
         "stamp",
-        "stamp_of",
         "stamp_of_measurement",
         "take_age",
         "time_of",
@@ -207,8 +204,72 @@ const TRIPS: [(&str, usize, &str); 10] = [
     ),
 ];
 
+/// The other functions that change the state of a motor: its target, its rest, its arming, the open share, the emergency stop.
+const ORDERS: [&str; 13] = [
+    "clear_emergency_stop",
+    "disarm",
+    "emergency_stop",
+    "engage",
+    "forget_target",
+    "hear_rival",
+    "open",
+    "pause",
+    "relax",
+    "renew_target",
+    "reopen",
+    "set_stop",
+    "take_target",
+];
+
+/// The functions of a latch that set a condition, or ask for one alone.
+const LATCHING: [&str; 3] = ["has", "report", "set"];
+
+/// Calls of these functions, by file: how many, and for what.
+const ORDERED: [(&str, usize, &str); 19] = [
+    (
+        "dji/attach.rs",
+        2,
+        "a request to arm, once the motors are fit; which motor has a second master",
+    ),
+    ("dji/slot.rs", 2, "a target like the one before"),
+    ("dji/slot/gap.rs", 2, "turns that may be missed, and a position that is set"),
+    ("dji/slot/health.rs", 1, "the error of an ESC"),
+    ("dji/slot/health.rs", 2, "no soft limit without a zero; two drives that are one again"),
+    (
+        "dji/slot/target.rs",
+        3,
+        "a target, of a new kind or as before, and none, as the application asks",
+    ),
+    ("dji/targets.rs", 3, "the application disarms, stops, and clears the stop"),
+    ("dji/watch.rs", 1, "a command of another node"),
+    ("motor/actuator/device.rs", 4, "the application arms, disarms, stops, and clears the stop"),
+    ("motor/actuator/joint.rs", 1, "no soft limit without an angle"),
+    (
+        "motor/actuator/mod.rs",
+        2,
+        "no target, as the application asks; the drive did not follow before",
+    ),
+    (
+        "motor/actuator/update.rs",
+        3,
+        "a mode that is no more, an angle that is lost, a drive that counts anew",
+    ),
+    ("pwm/brushed.rs", 4, "the application arms, disarms, stops, and clears the stop"),
+    ("pwm/rc.rs", 4, "the same"),
+    (
+        "snake/device.rs",
+        6,
+        "the same; which joint has a second master, and a fault ends with arming",
+    ),
+    ("snake/slot/health.rs", 1, "a second master counts from its last command"),
+    ("snake/bus.rs", 1, "a command of another node"),
+    ("snake/slot.rs", 1, "a zero that is set"),
+    ("snake/targets.rs", 2, "a target, and none, as the application asks"),
+];
+
 /// Where a family asks whether a step is usable, by file: how many times, and for what. The core says what an update without one does.
-const STEPS: [(&str, usize, &str); 4] = [
+const STEPS: [(&str, usize, &str); 5] = [
+    ("dji/bus.rs", 1, "for the core"),
     ("motor/actuator/update.rs", 2, "for the core, and before an update that changes nothing"),
     ("pwm/brushed.rs", 1, "for the core"),
     ("pwm/rc.rs", 1, "for the core"),
@@ -438,7 +499,9 @@ fn findings(folder: &str, files: &Files, used: &mut BTreeSet<String>) -> Vec<Str
             found.push(format!("{file} refuses to arm"));
         }
         // An update without a step is judged by the one rule about it.
-        let (steps, rows) = (text.matches("is_hold()").count(), STEPS.iter());
+        let asks =
+            |call: &[String]| call[1] == "(" && ["is_hold", "usable"].contains(&call[0].as_str());
+        let (steps, rows) = (tokens.windows(2).filter(|call| asks(call)).count(), STEPS.iter());
         if steps != rows.filter(|(name, ..)| name == file).map(|(_, steps, _)| steps).sum() {
             found.push(format!("{file} asks {steps} times for a usable step"));
         }
@@ -450,6 +513,16 @@ fn findings(folder: &str, files: &Files, used: &mut BTreeSet<String>) -> Vec<Str
         let (trips, rows) = (trips.count(), TRIPS.iter().filter(|(name, ..)| name == file));
         if trips != rows.map(|(_, trips, _)| trips).sum() {
             found.push(format!("{file} has {trips} calls by which a motor trips"));
+        }
+        let orders = tokens.windows(4).filter(|call| {
+            let [of, dot, name, bracket] = [0, 1, 2, 3].map(|at| call[at].as_str());
+            let may_be = if of == "latch" { &LATCHING[..] } else { &ORDERS[..] };
+            let is_core = ["guard", "rules", "device", "motor", "latch"].contains(&of);
+            is_core && dot == "." && bracket == "(" && may_be.contains(&name)
+        });
+        let (orders, rows) = (orders.count(), ORDERED.iter().filter(|(name, ..)| name == file));
+        if orders != rows.map(|(_, orders, _)| orders).sum() {
+            found.push(format!("{file} has {orders} calls that change the state of a motor"));
         }
         let links = tokens.windows(2).filter(|path| path[0] == "Link" && path[1] == "::").count();
         let rows = LINKS.iter().filter(|(name, ..)| name == file);
@@ -568,6 +641,19 @@ fn may_name(folder: &str, path: &[String]) -> bool {
         }
         _ => true,
     }
+}
+
+#[test]
+fn each_name_of_an_age_is_in_the_sources() {
+    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let all: BTreeSet<_> = rust_files(&src)
+        .iter()
+        .flat_map(|file| tokens(&fs::read_to_string(file).unwrap()))
+        .collect();
+    let names = AGES.functions.iter().chain(AGES.names).chain(AGES.types);
+    let names = names.chain(&TRIPPING).chain(&ORDERS).chain(&LATCHING);
+    let gone: Vec<_> = names.filter(|name| !all.contains(**name)).collect();
+    assert!(gone.is_empty(), "{gone:?}");
 }
 
 #[test]

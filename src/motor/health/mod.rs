@@ -138,7 +138,7 @@ impl core::fmt::Display for Health {
 /// | [`Offline`](Self::Offline) | the motor is lost, until ten good frames in a row | is relaxed |
 /// | [`PositionUncertain`](Self::PositionUncertain) | turns may have been missed, or the zero is lost, until the position is set | goes on (`dji`; with a gearbox and a zero, positions are refused); is relaxed, and its zero is lost (actuator, joint of `snake`) |
 /// | [`Warning`](Self::Warning) | the ESC reports a warning | goes on |
-/// | [`Fault`](Self::Fault) | the ESC reports a fault, has started again, or was found in a state that it was not told | is relaxed |
+/// | [`Fault`](Self::Fault) | the ESC reports a fault, has started again without being *offline*, or was found in a state that it was not told | is relaxed |
 /// | [`Warm`](Self::Warm) | the motor is above its warning temperature | has less output |
 /// | [`Hot`](Self::Hot) | the motor is above its limit temperature | has no output |
 /// | [`Stalled`](Self::Stalled) | the motor is driven and does not turn | as configured; goes on |

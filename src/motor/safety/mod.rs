@@ -52,9 +52,9 @@ enum Arming {
 pub(crate) enum Rest {
     /// No rest.
     None,
-    /// The feedback was late, or its count moved: older measurements give no rate.
+    /// The feedback was late, its count moved, or a target was refused meanwhile: older measurements give no rate.
     Pause,
-    /// There was no target: the loops start afresh.
+    /// The target was discarded: the loops start afresh.
     Relaxed,
 }
 
