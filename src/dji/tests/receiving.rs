@@ -139,6 +139,7 @@ fn a_position_from_a_zero_in_doubt_is_refused_and_a_velocity_is_taken() {
     assert_eq!(bus.ingest(&feedback(0x201, 0, 9000), at_ms(3)), Ingest::Taken);
     assert_eq!(bus.ingest(&feedback(0x201, 17, 9000), at_ms(83)), Ingest::Taken);
     assert_eq!(bus.state(wheel).unwrap().homing, Homing::Uncertain);
+    assert_eq!(bus.health(wheel).unwrap().ambiguous_gaps, 1);
     step(&mut bus, 84);
     assert!(sent(&mut bus).iter().all(|(_, words)| *words == [0; 4]), "the target is of the zero");
     assert_eq!(bus.set_position(wheel, goal), Err(TargetError::NotHomed));

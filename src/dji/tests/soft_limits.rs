@@ -155,3 +155,24 @@ fn a_limit_ahead_begins_once_while_the_range_opens() {
     let of_limit = edges.filter(|edge| edge.condition == Condition::SoftLimit);
     assert_eq!(of_limit.map(|edge| edge.began).collect::<Vec<_>>(), [true]);
 }
+
+/// A quarter of a narrow range is left at each end: 0.5 to 0.54 rad ends at 0.53.
+#[test]
+fn a_position_beyond_a_narrow_range_ends_a_quarter_of_it_inside() {
+    static NARROW: HealthConfig =
+        HealthConfig::new().with_soft_limits(Angle::from_radians(0.5), Angle::from_radians(0.54));
+    let config =
+        Config::<Gm6020Voltage>::at_once(1).with_health(&NARROW).position_loop(SPEED, SPEED);
+    for (counts, is_upward) in [(689, true), (693, false)] {
+        let (mut bus, [yaw]) = armed([config]);
+        let mut words = Vec::new();
+        for ms in 2..60 {
+            assert_eq!(bus.ingest(&feedback(0x205, counts, 0), at_ms(ms)), Ingest::Taken);
+            bus.set_position(yaw, Position::from_angle(Angle::from_radians(1.0))).unwrap();
+            step(&mut bus, ms);
+            words = sent(&mut bus);
+        }
+        let [(_, [word, ..])] = words[..] else { panic!("{words:?}") };
+        assert!(word != 0 && (word > 0) == is_upward, "{counts}: {word}");
+    }
+}
