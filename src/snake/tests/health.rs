@@ -53,6 +53,20 @@ fn a_silent_joint_is_late_and_lost_and_both_end_when_it_is_back() {
     assert_eq!(edges(&mut bench.joints), [(5, Condition::PositionUncertain, false)]);
 }
 
+/// Before the first update the replies of joints are the clock: after 70 s a joint is lost. A reply of nobody and a command tell no time.
+#[test]
+fn before_the_first_update_only_a_reply_of_a_joint_moves_the_time() {
+    let position = |id| reply(id, Register::ActualPosition, 0);
+    let command = Command::DISABLE.frame(2).unwrap();
+    for (later, is_lost) in [(position(2), true), (position(9), false), (command, false)] {
+        let mut bench = Bench::new(&[1, 2]);
+        assert_eq!(bench.joints.ingest(&position(1), at_ms(1)), Ingest::Taken);
+        _ = bench.joints.ingest(&later, at_ms(70_000));
+        let link = bench.joints.link(bench.handles[0]);
+        assert_eq!(link, Some(if is_lost { Link::Offline } else { Link::Online }), "{later:?}");
+    }
+}
+
 #[test]
 fn what_changes_a_thousand_times_before_it_is_read_is_one_edge_each_way_and_the_present_state() {
     let mut bench = Bench::armed(&[1, 2]);
