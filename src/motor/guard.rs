@@ -128,7 +128,7 @@ impl Guard {
     }
 
     /// Moves the time on to a tick and tells whether the motor may be driven in this tick. If not, send zero; and reset the loops if
-    /// [`has_target`](Self::has_target) is `false`, unless the [`link`](Self::link) is only late: loops of `dji` and [`Brushed`](crate::pwm::Brushed) then go on with their integral.
+    /// [`has_target`](Self::has_target) is `false`, unless the [`link`](Self::link) is only late: loops of `dji` and `pwm::Brushed` then go on with their integral.
     #[must_use]
     #[inline]
     pub fn drives(&mut self, now: Instant) -> bool {

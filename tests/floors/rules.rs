@@ -221,6 +221,10 @@ const ORDERS: [&str; 13] = [
     "take_target",
 ];
 
+/// The names of the core's parts in a family, and their types.
+const CORES: [&str; 5] = ["guard", "rules", "device", "motor", "latch"];
+const CORE_TYPES: [&str; 4] = ["Guard", "DeviceGuard", "MotorGuard", "Rules"];
+
 /// The functions of a latch that set a condition, or ask for one alone.
 const LATCHING: [&str; 3] = ["has", "report", "set"];
 
@@ -515,10 +519,11 @@ fn findings(folder: &str, files: &Files, used: &mut BTreeSet<String>) -> Vec<Str
             found.push(format!("{file} has {trips} calls by which a motor trips"));
         }
         let orders = tokens.windows(4).filter(|call| {
-            let [of, dot, name, bracket] = [0, 1, 2, 3].map(|at| call[at].as_str());
+            let [of, dot, name, after] = [0, 1, 2, 3].map(|at| call[at].as_str());
             let may_be = if of == "latch" { &LATCHING[..] } else { &ORDERS[..] };
-            let is_core = ["guard", "rules", "device", "motor", "latch"].contains(&of);
-            is_core && dot == "." && bracket == "(" && may_be.contains(&name)
+            let is_call = dot == "." && after == "(" && CORES.contains(&of);
+            let is_path = dot == "::" && CORE_TYPES.contains(&of);
+            (is_call || is_path) && may_be.contains(&name)
         });
         let (orders, rows) = (orders.count(), ORDERED.iter().filter(|(name, ..)| name == file));
         if orders != rows.map(|(_, orders, _)| orders).sum() {

@@ -102,7 +102,7 @@ impl PositionActuator {
 
     /// Steps by a validated time step, and returns the output.
     ///
-    /// Costs 162 instructions on a Cortex-M4F (`docs/figures.md`).
+    /// Costs 163 instructions on a Cortex-M4F (`docs/figures.md`).
     pub fn step(&mut self, setpoint: f32, angle: f32, speed: f32, step: &TimeStep) -> f32 {
         let finite = setpoint.is_finite() && angle.is_finite() && speed.is_finite();
         if !step.admits(finite, &mut self.rejected) {
