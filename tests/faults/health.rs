@@ -305,7 +305,7 @@ fn f19_each_error_code_is_an_edge_and_faults_relax() {
     assert_eq!(hear(3, 2), [(fault, true)]);
     assert_eq!(hear(4, 22), [(fault, true)]);
     assert_eq!(hear(8, 42), [(warning, true), (fault, false)]);
-    // An error that comes and goes all the time, unread for a second, is one edge each way, and one more that tells the present state.
+    // An error that comes and goes all the time, unread for a second, is one edge.
     let (mut bus, [wheel]) = armed([Config::new(1)]);
     for ms in 2..1_002 {
         let mut data = *feedback(0x201, 0, 0).bytes();
@@ -314,11 +314,9 @@ fn f19_each_error_code_is_an_edge_and_faults_relax() {
         step(&mut bus, ms);
     }
     let told = edges(&mut bus);
-    let holds = bus.conditions(wheel).contains(fault);
-    assert_eq!(told, [(fault, true), (fault, false), (fault, true)][..2 + usize::from(holds)]);
-    saw(
-        "8 of C620 and 6 of C610 warn, the others relax; one edge each; 1 s of flicker is one each way",
-    );
+    assert_eq!(began(&told, fault), 1, "{told:?}");
+    assert!(told.len() <= 2 && bus.state(wheel).is_some());
+    saw("8 of C620 and 6 of C610 warn, the others relax; one edge each; 1 s of flicker is one");
 }
 
 #[cfg_attr(test, test)]

@@ -19,8 +19,7 @@ const TOLD_US: u64 = 24 * 86_400_000_000;
 struct Change {
     condition: Condition,
     began: bool,
-    /// `None` where no time is told.
-    at: Option<u64>,
+    at: u64,
     /// The number of the call that found it: changes of one call have no order.
     call: u64,
 }
@@ -32,7 +31,7 @@ impl Change {
 
     /// Times are told in units of 1024 µs, rounded down.
     fn has_time_of(&self, edge: &Edge<Condition, MotorName>) -> bool {
-        self.at.is_none_or(|at| at / 1024 == edge.at.as_micros() / 1024)
+        self.at / 1024 == edge.at.as_micros() / 1024
     }
 }
 
@@ -77,7 +76,7 @@ impl Edges {
         if waiting.any(|change| (change.condition, change.began) == (condition, holds)) {
             return;
         }
-        let change = Change { condition, began: holds, at: Some(at), call: self.calls };
+        let change = Change { condition, began: holds, at, call: self.calls };
         self.since.push(change);
         if self.crowded.is_empty() && self.unread.len() < self.room {
             return self.unread.push(change);
@@ -107,7 +106,7 @@ impl Edges {
 
     /// Takes an edge that the device has returned; its last update was at `updated`.
     pub(super) fn read(&mut self, edge: &Edge<Condition, MotorName>, updated: u64) {
-        let is_told = |change: &Change| change.at.is_some_and(|at| at.abs_diff(updated) < TOLD_US);
+        let is_told = |change: &Change| change.at.abs_diff(updated) < TOLD_US;
         if let Some(oldest) = self.unread.first().map(|change| change.call) {
             let mut first = self.unread.iter().take_while(|change| change.call == oldest);
             let at = first.position(|change| change.is(edge));
@@ -123,16 +122,6 @@ impl Edges {
             let known = |change: &Change| !is_told(change) || change.has_time_of(edge);
             assert!(self.since.iter().any(known), "the time of an edge, {edge}: {self:?}");
             self.crowded.remove(at);
-        }
-        // The change back was unread already when the condition changed for the last time: its time is not known.
-        let (condition, began) = (edge.condition, !edge.began);
-        let back = Change { condition, began, at: None, call: self.calls };
-        let mut waiting = self.unread.iter().chain(&self.crowded);
-        let waits =
-            waiting.any(|other| (other.condition, other.began) == (back.condition, back.began));
-        if self.has(back.condition) == back.began && !waits {
-            let list = if self.crowded.is_empty() { &mut self.unread } else { &mut self.crowded };
-            list.push(back);
         }
         if self.is_read() {
             self.since.clear();
