@@ -491,6 +491,36 @@ fn files_of(folder: &str) -> Files {
     files.filter(|(name, _)| !name.contains("/tests")).collect()
 }
 
+fn steps_in(tokens: &[String]) -> usize {
+    let asks =
+        |call: &&[String]| call[1] == "(" && ["is_hold", "usable"].contains(&call[0].as_str());
+    tokens.windows(2).filter(asks).count()
+}
+
+fn trips_in(tokens: &[String]) -> usize {
+    let trips = |call: &&[String]| {
+        let is_call =
+            [".", "::"].contains(&call[0].as_str()) && [",", "(", ")"].contains(&call[2].as_str());
+        is_call && TRIPPING.contains(&call[1].as_str())
+    };
+    tokens.windows(3).filter(trips).count()
+}
+
+fn orders_in(tokens: &[String]) -> usize {
+    let orders = |call: &&[String]| {
+        let [of, dot, name, after] = [0, 1, 2, 3].map(|at| call[at].as_str());
+        let may_be = if of == "latch" { &LATCHING[..] } else { &ORDERS[..] };
+        let is_call = dot == "." && after == "(" && CORES.contains(&of);
+        let is_path = dot == "::" && CORE_TYPES.contains(&of);
+        (is_call || is_path) && may_be.contains(&name)
+    };
+    tokens.windows(4).filter(orders).count()
+}
+
+fn links_in(tokens: &[String]) -> usize {
+    tokens.windows(2).filter(|path| path[0] == "Link" && path[1] == "::").count()
+}
+
 /// What is found in a folder. `used` has the rows of the tables that were needed.
 fn findings(folder: &str, files: &Files, used: &mut BTreeSet<String>) -> Vec<String> {
     let mut found = Vec::new();
@@ -502,37 +532,16 @@ fn findings(folder: &str, files: &Files, used: &mut BTreeSet<String>) -> Vec<Str
         if makes_refusal(&tokens) {
             found.push(format!("{file} refuses to arm"));
         }
-        // An update without a step is judged by the one rule about it.
-        let asks =
-            |call: &[String]| call[1] == "(" && ["is_hold", "usable"].contains(&call[0].as_str());
-        let (steps, rows) = (tokens.windows(2).filter(|call| asks(call)).count(), STEPS.iter());
-        if steps != rows.filter(|(name, ..)| name == file).map(|(_, steps, _)| steps).sum() {
-            found.push(format!("{file} asks {steps} times for a usable step"));
-        }
-        let trips = tokens.windows(3).filter(|call| {
-            let is_call = [".", "::"].contains(&call[0].as_str())
-                && [",", "(", ")"].contains(&call[2].as_str());
-            is_call && TRIPPING.contains(&call[1].as_str())
-        });
-        let (trips, rows) = (trips.count(), TRIPS.iter().filter(|(name, ..)| name == file));
-        if trips != rows.map(|(_, trips, _)| trips).sum() {
-            found.push(format!("{file} has {trips} calls by which a motor trips"));
-        }
-        let orders = tokens.windows(4).filter(|call| {
-            let [of, dot, name, after] = [0, 1, 2, 3].map(|at| call[at].as_str());
-            let may_be = if of == "latch" { &LATCHING[..] } else { &ORDERS[..] };
-            let is_call = dot == "." && after == "(" && CORES.contains(&of);
-            let is_path = dot == "::" && CORE_TYPES.contains(&of);
-            (is_call || is_path) && may_be.contains(&name)
-        });
-        let (orders, rows) = (orders.count(), ORDERED.iter().filter(|(name, ..)| name == file));
-        if orders != rows.map(|(_, orders, _)| orders).sum() {
-            found.push(format!("{file} has {orders} calls that change the state of a motor"));
-        }
-        let links = tokens.windows(2).filter(|path| path[0] == "Link" && path[1] == "::").count();
-        let rows = LINKS.iter().filter(|(name, ..)| name == file);
-        if links != rows.map(|(_, links, _)| links).sum() {
-            found.push(format!("{file} asks {links} times for the link"));
+        for (calls, table, what) in [
+            (steps_in(&tokens), &STEPS[..], "questions for a usable step"),
+            (trips_in(&tokens), &TRIPS, "calls by which a motor trips"),
+            (orders_in(&tokens), &ORDERED, "calls that change the state of a motor"),
+            (links_in(&tokens), &LINKS, "questions for the link"),
+        ] {
+            let rows = table.iter().filter(|(name, ..)| name == file);
+            if calls != rows.map(|(_, calls, _)| calls).sum() {
+                found.push(format!("{file} has {calls} {what}"));
+            }
         }
         let mut row = |table: &[(&str, &str, &[&str])], name: &String, is: &str| {
             let listed = |(of, _, names): &&(&str, &str, &[&str])| {
