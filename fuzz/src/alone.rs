@@ -109,11 +109,11 @@ impl Alone {
     pub fn engage(&mut self, now: Instant) -> bool {
         let before = self.is_armed();
         let granted = self.bus.ask();
-        let missing = self.bus.missing(now).next().is_some();
-        if granted && self.motor.is_some() && !missing && self.bus.faulty().next().is_none() {
+        let is_heard = self.bus.missing(now).next().is_none();
+        self.bus.engage(now);
+        if granted && is_heard && self.is_armed() {
             self.armed_at = self.armed_at.max(now.as_micros());
         }
-        self.bus.engage(now);
         if !before && self.is_armed() {
             self.rest();
             (self.opened, self.lost_time) = (Some(now.as_micros()), false);

@@ -502,9 +502,12 @@ impl CanDevice for Watched {
         self.gesture.update(step);
         self.noting_trips(|bus| bus.update(tick));
         let is_after_the_last = self.updated.is_none_or(|updated| updated < now);
-        self.each_alone(|alone| match lost {
-            true => alone.lose_update(tick, is_after_the_last),
-            false => alone.update(tick),
+        self.each_alone(|alone| {
+            if lost {
+                alone.lose_update(tick, is_after_the_last);
+            } else {
+                alone.update(tick);
+            }
         });
         if lost {
             self.forget_the_unknowing();
