@@ -127,8 +127,9 @@ impl Guard {
         self.motor.require_zero(target)
     }
 
-    /// Moves the time on to a tick and tells whether the motor may be driven in this tick. If not, send zero; and reset the loops if
-    /// [`has_target`](Self::has_target) is `false`, unless the [`link`](Self::link) is only late: loops of `dji` and `pwm::Brushed` then go on with their integral.
+    /// Moves the time on to a tick and tells whether the motor may be driven in this tick. If not, send zero. If
+    /// [`has_target`](Self::has_target) is `false` as well, reset the loops. If the [`link`](Self::link) is late, the loops may keep their integral, as
+    /// loops of `dji` and `pwm::Brushed` do.
     #[must_use]
     #[inline]
     pub fn drives(&mut self, now: Instant) -> bool {
@@ -255,7 +256,7 @@ impl Guard {
         self.motor.disarm();
     }
 
-    /// Disarms, and requires a new request to arm, of a motor that is not armed too: for a fault of what surrounds the motor, its bus for example.
+    /// Disarms, and begins the pause before the next request to arm, also if the motor was not armed: for a fault outside of the motor, such as a lost bus.
     pub const fn trip(&mut self) {
         self.motor.disarm();
         self.device.trip();
@@ -312,7 +313,7 @@ impl Default for Guard {
 
 /// Targets, measurements and feedback of the motors of a device.
 impl<const N: usize> DeviceGuard<N> {
-    /// Sets the target of a motor. The next update notes that it came after an expired one.
+    /// Sets the target of a motor. After an expired target, the next update ends that condition.
     #[inline]
     pub(crate) const fn take_target(&mut self, motor: &mut MotorGuard) {
         if !motor.has_target() {

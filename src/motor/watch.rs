@@ -114,7 +114,7 @@ impl Watch {
         guard.hear_rival(now, |motor| motor.judge(Condition::SecondMaster, true, self.config));
     }
 
-    /// Trips the motor as by a fault that the drive reports in one update; of old feedback, without a fault.
+    /// Trips the motor, with a [fault](Condition::Fault) as if the drive reported the fault in one update. If the motor is not online, there is no fault.
     pub(crate) fn fail(&mut self, guard: &mut Guard, error_code: u8, now: Instant) {
         self.error_code = error_code;
         let is_online = guard.link() == Link::Online;
@@ -306,7 +306,7 @@ impl Guard {
     }
 }
 
-/// Age of feedback, consequences of conditions, and what the health of a motor has of them.
+/// Age of feedback, conditions with their consequences, and the part of the health that a guard holds.
 impl MotorGuard {
     /// Sets whether a condition holds that is not ignored, and takes its consequences.
     pub(crate) fn judge(&mut self, condition: Condition, holds: bool, config: &HealthConfig) {
@@ -328,7 +328,7 @@ impl MotorGuard {
         age(now, self.heard) <= micros
     }
 
-    /// Trips as by a fault of the drive, which is in a state that nobody told it.
+    /// Trips the motor: the drive is in an unexpected state, which counts as its fault.
     pub(crate) fn fail(&mut self, config: &HealthConfig) {
         self.judge(Condition::Fault, true, config);
         self.trip();

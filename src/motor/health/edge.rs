@@ -44,8 +44,8 @@ impl Latch {
         }
     }
 
-    /// Ends the conditions that an update with a step ends: an expired target if there is a new one, and a second master if no other node commands
-    /// the device.
+    /// Ends conditions in an update with a usable step: lost time; an expired target, if there is a new one; a second master, if no other node
+    /// commands the device.
     pub(crate) const fn end_what_is_over(&mut self, has_target: bool, is_alone: bool) {
         if has_target {
             self.set(Condition::CommandLost, false);
@@ -164,7 +164,7 @@ impl<const N: usize> Journal<N> {
         self.length == 0 && !self.is_overfull
     }
 
-    /// Takes the oldest unread change of the motors, which is an edge, with the name of its motor.
+    /// Takes the oldest unread edge of the motors, with the name of its motor.
     pub(crate) fn next_edge<M: Latched>(
         &mut self,
         motors: &mut [M],

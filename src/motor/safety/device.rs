@@ -245,8 +245,8 @@ impl<const N: usize> DeviceGuard<N> {
         self.held_steps
     }
 
-    /// Notes a command of another node, whose motors `change`: they have a [second master](crate::motor::Condition::SecondMaster) until the
-    /// other node is silent for a second.
+    /// Notes a command of another node. `change` begins the condition of a [second master](crate::motor::Condition::SecondMaster), which ends
+    /// after a second without such a command.
     pub(crate) fn hear_rival(&mut self, now: Instant, change: impl FnOnce(&mut Self)) {
         self.rival_heard = now.stamp();
         change(self);

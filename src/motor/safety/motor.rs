@@ -11,7 +11,8 @@ use crate::time::Duration;
 pub(crate) struct InTime(u32);
 
 impl InTime {
-    /// Counts up to 32 767, or 4 s of a bus full of frames of one motor, and is taken each second. An overflow lengthens the gap by 1 µs, for a minute at most.
+    /// Counts up to 32 767, or 4 s of a bus full of frames of one motor. The count is taken each second. Each overflow would lengthen the gap
+    /// by 1 µs, for a minute at most: after a longer pause between two updates no age is known.
     const COUNT_BITS: u32 = 15;
     const COUNT: u32 = (1 << Self::COUNT_BITS) - 1;
 

@@ -1,4 +1,4 @@
-//! Updates without a time step: the output that a motor keeps, and the loop that goes on from that output.
+//! The first update without a time step repeats the output of a motor, and the loop then continues from that output.
 
 use super::*;
 

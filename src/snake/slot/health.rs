@@ -74,6 +74,7 @@ impl Slot {
 
     /// Handles a drive in an unexpected state: its zero may differ, so the joint stays relaxed until armed again.
     fn distrust(&mut self, rules: &mut Rules, now: Instant) {
+        // Two changes: the fault is the first edge.
         rules.change(self, self.place(), now, |slot| slot.guard.fail(slot.stall.health()));
         rules.change(self, self.place(), now, Self::lose_zero);
         // Of a joint that is not armed too: a request to arm counts once the jumps are over.
